@@ -1,0 +1,2 @@
+//! motionctl
+fn main() {}
