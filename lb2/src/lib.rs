@@ -7,4 +7,6 @@ extern crate alloc;
 #[cfg(test)]
 extern crate std;
 
+pub mod code;
 pub mod frame;
+pub mod telegram;
