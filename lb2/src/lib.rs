@@ -8,5 +8,6 @@ extern crate alloc;
 extern crate std;
 
 pub mod code;
+pub mod device;
 pub mod frame;
 pub mod telegram;

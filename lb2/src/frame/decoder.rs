@@ -191,10 +191,10 @@ impl Decoder {
         self.gap = self.in_block || self.escape || self.start < self.end;
     }
 
-    /// Whether a head has been seen whose telegram is not complete.
+    /// Whether a head, or the first byte of one, has been seen whose telegram is not complete.
     #[must_use]
     pub const fn in_telegram(&self) -> bool {
-        self.in_block
+        self.in_block || self.escape
     }
 
     /// Wire offset of the next byte: bytes taken since the decoder was made.
