@@ -10,4 +10,5 @@ extern crate std;
 pub mod code;
 pub mod device;
 pub mod frame;
+pub mod master;
 pub mod telegram;

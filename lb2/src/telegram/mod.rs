@@ -104,6 +104,35 @@ pub struct NumberError {
     pub found: u8,
 }
 
+/// What request and answer have in common, by which a master knows whose answer it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Echo {
+    /// Function byte.
+    pub function: u8,
+    /// Sub-function byte of CCh.
+    pub sub: Option<u8>,
+    /// Device number, bank or parameter index where the answer repeats it, else 0.
+    pub key: u16,
+    /// Bytes read by 22h and 24h, else 0.
+    pub len: u8,
+}
+
+impl core::fmt::Display for Echo {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "{:02X}h", self.function)?;
+        if let Some(sub) = self.sub {
+            write!(f, " {sub:02X}h")?;
+        }
+        match (self.function, self.sub) {
+            (function::SELECT, _) => write!(f, " device {}", self.key),
+            (_, Some(sub::READ_FLASH | sub::READ_RAM)) => write!(f, " bank {}, {} bytes", self.key, self.len),
+            (_, Some(0x20..=0x2F)) => write!(f, " bank {}", self.key),
+            (_, Some(sub::READ_PARAMETER..=sub::WRITE_PARAMETER_EXTENDED)) => write!(f, " [{:03}]", self.key),
+            _ => Ok(()),
+        }
+    }
+}
+
 /// Name of a function, as manual A gives it; `sub` is the first data byte, used for CCh only.
 /// `None` for functions unknown to us.
 #[must_use]

@@ -1,6 +1,6 @@
 //! What a master asks.
 
-use super::{BANK_LEN, Data, Fields, MAX_BANK_DATA, NumberError, bank, data_of, function, sub};
+use super::{BANK_LEN, Data, Echo, Fields, MAX_BANK_DATA, NumberError, bank, data_of, function, sub};
 use crate::code::ErrorCode;
 use crate::frame::{EncodeError, Frame, MAX_DATA};
 
@@ -250,6 +250,31 @@ impl<'a> Request<'a> {
             Self::SaveParameters => sub::SAVE_PARAMETERS,
             _ => return None,
         })
+    }
+
+    /// What an answer to this request repeats of it.
+    #[must_use]
+    pub fn echo(&self) -> Echo {
+        let (key, len) = match *self {
+            Self::SelectDevice(number) => (u16::from(number), 0),
+            Self::EraseFlash { bank }
+            | Self::WriteFlash { bank, .. }
+            | Self::WriteRam { bank, .. }
+            | Self::WriteFlashAt { bank, .. } => (u16::from(bank), 0),
+            Self::ReadFlash { bank, count, .. } | Self::ReadRam { bank, count, .. } => {
+                (u16::from(bank), count)
+            }
+            Self::ReadParameter { index }
+            | Self::DescribeParameter { index }
+            | Self::WriteParameter { index, .. }
+            | Self::WriteParameterExtended { index, .. } => (index, 0),
+            _ => (0, 0),
+        };
+        let sub = match *self {
+            Self::Raw { function: function::EXTENSION, data } => data.first().copied(),
+            _ => self.sub(),
+        };
+        Echo { function: self.function(), sub, key, len }
     }
 
     /// Whether sending the request twice has the same effect as sending it once: reads and the

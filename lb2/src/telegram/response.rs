@@ -1,7 +1,7 @@
 //! What a device answers.
 
 use super::{
-    Data, Fields, MAX_FAILURES, MAX_GROUP, MAX_MESSAGE, MAX_NAME, MAX_VARIANT, NumberError, Request, Text,
+    Data, Echo, Fields, MAX_FAILURES, MAX_GROUP, MAX_MESSAGE, MAX_NAME, MAX_VARIANT, NumberError, Text,
     data_of, function, sub,
 };
 use crate::code::{ErrorCode, Failure, LoaderCode, StoredFailure, Version};
@@ -343,45 +343,29 @@ impl<'a> Response<'a> {
         })
     }
 
-    /// Whether this can be the answer to `request`: same function and sub-function, same device
-    /// number, bank, index and count where the answer repeats them. An error telegram answers
-    /// everything; a raw answer answers a raw request of its function (and sub-function, for CCh).
+    /// What this answer repeats of its request; `None` for an error telegram, which answers every
+    /// request.
     #[must_use]
-    pub fn answers(&self, request: &Request<'_>) -> bool {
-        match (*self, *request) {
-            (Self::Error(_), _) => true,
-            (Self::Selected(got), Request::SelectDevice(asked)) => got == asked,
-            (Self::DeviceType { .. }, Request::DeviceType)
-            | (Self::OsVersion(_), Request::OsVersion)
-            | (Self::CustomVersion(_), Request::CustomVersion)
-            | (Self::Failures(_), Request::Failures)
-            | (Self::FailureCount(_), Request::FailureCount)
-            | (Self::FailuresDeleted(_), Request::DeleteFailures)
-            | (Self::LoaderCalled { .. }, Request::CallLoader)
-            | (Self::ParametersSaved, Request::SaveParameters) => true,
-            (Self::FlashErased { bank: got }, Request::EraseFlash { bank })
-            | (Self::FlashWritten { bank: got }, Request::WriteFlash { bank, .. })
-            | (Self::RamWritten { bank: got }, Request::WriteRam { bank, .. })
-            | (Self::FlashWrittenAt { bank: got }, Request::WriteFlashAt { bank, .. }) => got == bank,
-            (Self::FlashData { bank: got, data }, Request::ReadFlash { bank, count, .. })
-            | (Self::RamData { bank: got, data }, Request::ReadRam { bank, count, .. }) => {
-                got == bank && data.len() == usize::from(count)
-            }
-            (Self::Parameter { index: got, .. }, Request::ReadParameter { index })
-            | (
-                Self::ParameterDescription(Description { index: got, .. }),
-                Request::DescribeParameter { index },
-            )
-            | (Self::ParameterWritten { index: got, .. }, Request::WriteParameter { index, .. })
-            | (
-                Self::ParameterWrittenExtended { index: got, .. },
-                Request::WriteParameterExtended { index, .. },
-            ) => got == index,
-            (Self::Raw { function: got, data }, Request::Raw { function, data: asked }) => {
-                got == function && (got != function::EXTENSION || data.first() == asked.first())
-            }
-            _ => false,
-        }
+    pub fn echo(&self) -> Option<Echo> {
+        let (key, len) = match *self {
+            Self::Error(_) => return None,
+            Self::Selected(number) => (u16::from(number), 0),
+            Self::FlashErased { bank }
+            | Self::FlashWritten { bank }
+            | Self::RamWritten { bank }
+            | Self::FlashWrittenAt { bank } => (u16::from(bank), 0),
+            Self::FlashData { bank, data } | Self::RamData { bank, data } => (u16::from(bank), data.len()),
+            Self::Parameter { index, .. }
+            | Self::ParameterDescription(Description { index, .. })
+            | Self::ParameterWritten { index, .. }
+            | Self::ParameterWrittenExtended { index, .. } => (index, 0),
+            _ => (0, 0),
+        };
+        let sub = match *self {
+            Self::Raw { function: function::EXTENSION, data } => data.first().copied(),
+            _ => self.sub(),
+        };
+        Some(Echo { function: self.function(), sub, key, len: u8::try_from(len).unwrap_or(u8::MAX) })
     }
 }
 
