@@ -89,7 +89,7 @@ pub trait Device {
     /// The error code to answer with.
     fn save_parameters(&mut self) -> Result<(), ErrorCode>;
 
-    /// A function of the device's own: writes the reply's data to `reply` (253 bytes) and returns
+    /// A function of the device's own (any but FFh, which is reply only): writes the reply's data to `reply` (253 bytes) and returns
     /// their number; the reply has the same function byte. `data` is everything between function
     /// and check byte.
     ///
@@ -381,6 +381,8 @@ fn execute(request: &Request<'_>, device: &mut impl Device, tx: &mut [u8]) -> Re
         }
         Request::CallLoader => Response::LoaderCalled { offset: device.call_loader() },
         Request::SaveParameters => device.save_parameters().map(|()| Response::ParametersSaved)?,
+        // FFh is reply only: an answer with it would be taken for an error telegram.
+        Request::Raw { function: function::ERROR, .. } => return Err(ErrorCode::FUNCTION),
         Request::Raw { function, data } => {
             let len = device.own_function(function, data, &mut buffer)?.min(MAX_DATA);
             Response::Raw { function, data: buffer.get(..len).unwrap_or(&[]) }

@@ -94,7 +94,7 @@ impl Device for Small {
     }
     fn own_function(&mut self, function: u8, data: &[u8], reply: &mut [u8]) -> Result<usize, ErrorCode> {
         match function {
-            0x77 => {
+            0x77 | 0xFF => {
                 reply.iter_mut().zip(data.iter().rev()).for_each(|(to, from)| *to = *from);
                 Ok(data.len())
             }
@@ -180,6 +180,14 @@ fn every_function_is_answered() {
     is(Request::Raw { function: 0x40, data: &[1] }, Response::Error(ErrorCode::NUMBER));
     is(Request::Failures, Response::Failures(lb2::telegram::Failures::new(&[0, Failure::RECEIVE_COUNT.0])));
     is(Request::DeleteFailures, Response::FailuresDeleted(1));
+}
+
+/// Found by fuzzing: FFh is a reply only, its echo would read as an error telegram.
+#[test]
+fn function_ffh_never_reaches_the_device() {
+    let (mut engine, mut device) = (DeviceEngine::default(), small(0));
+    let request = Request::Raw { function: 0xFF, data: &[1, 2, 3] };
+    asks(&mut engine, &mut device, request, Some(Response::Error(ErrorCode::FUNCTION)));
 }
 
 /// Decision 8.

@@ -1,1 +1,3 @@
-//! Helpers shared by the whole-family tests.
+//! Helpers shared by the whole-family tests and the fuzz targets.
+
+pub mod fuzz;

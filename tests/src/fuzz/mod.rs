@@ -1,0 +1,55 @@
+//! What the fuzz targets do with their input, here so that the committed corpora are replayed by an
+//! ordinary test. A finding is a panic: of the code under test, or of an assertion here.
+
+mod device;
+mod frames;
+mod master;
+
+pub use device::device_ops;
+pub use frames::{decode, request, response};
+pub use master::master_ops;
+
+/// A fuzz target.
+pub type Target = fn(&[u8]);
+
+/// Every target by its name under `fuzz/fuzz_targets` and `fuzz/corpus`.
+pub const TARGETS: [(&str, Target); 5] = [
+    ("lb2_decode", decode),
+    ("lb2_request", request),
+    ("lb2_response", response),
+    ("lb2_master_ops", master_ops),
+    ("lb2_device_ops", device_ops),
+];
+
+/// Takes values from the front of fuzz input; an exhausted input gives zeros.
+struct Input<'a>(&'a [u8]);
+
+impl<'a> Input<'a> {
+    fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    fn u8(&mut self) -> u8 {
+        match self.0.split_first() {
+            Some((&byte, rest)) => {
+                self.0 = rest;
+                byte
+            }
+            None => 0,
+        }
+    }
+
+    fn u16(&mut self) -> u16 {
+        u16::from_le_bytes([self.u8(), self.u8()])
+    }
+
+    fn i32(&mut self) -> i32 {
+        i32::from_le_bytes([self.u8(), self.u8(), self.u8(), self.u8()])
+    }
+
+    fn bytes(&mut self, len: u8) -> &'a [u8] {
+        let (head, rest) = self.0.split_at(usize::from(len).min(self.0.len()));
+        self.0 = rest;
+        head
+    }
+}
