@@ -7,4 +7,9 @@ extern crate alloc;
 #[cfg(test)]
 extern crate std;
 
+mod controller;
+pub mod loader;
 pub mod parameters;
+pub mod storage;
+
+pub use controller::{AXES, Controller, Model, OS_VERSION, Reset, ResetError, STORAGE_LEN};
