@@ -219,6 +219,12 @@ impl Master {
         }
     }
 
+    /// The times of the line.
+    #[must_use]
+    pub const fn config(&self) -> Config {
+        self.config
+    }
+
     /// The receiver's decoder, for its counters.
     #[must_use]
     pub const fn decoder(&self) -> &Decoder {

@@ -1,0 +1,93 @@
+//! Byte streams over TCP, as serial device servers give them.
+
+use core::time::Duration;
+use std::io::{self, Read, Write};
+use std::net::{TcpListener, TcpStream, ToSocketAddrs};
+
+use crate::endpoint::Endpoint;
+use crate::port::{OpenError, Port, Role};
+
+/// Longest wait for a connection.
+const CONNECT: Duration = Duration::from_secs(5);
+
+pub(crate) fn open(endpoint: &Endpoint, address: &str, role: Role) -> Result<Box<dyn Port>, OpenError> {
+    let failed = |error| OpenError::new(endpoint, error);
+    match role {
+        Role::Master => {
+            let mut last = io::Error::from(io::ErrorKind::AddrNotAvailable);
+            for address in address.to_socket_addrs().map_err(failed)? {
+                match TcpStream::connect_timeout(&address, CONNECT) {
+                    Ok(stream) => {
+                        stream.set_nodelay(true).map_err(failed)?;
+                        return Ok(Box::new(Stream(stream)));
+                    }
+                    Err(error) => last = error,
+                }
+            }
+            Err(failed(last))
+        }
+        Role::Device => {
+            let listener = TcpListener::bind(address).map_err(failed)?;
+            listener.set_nonblocking(true).map_err(failed)?;
+            Ok(Box::new(Listener { listener, stream: None }))
+        }
+    }
+}
+
+struct Stream(TcpStream);
+
+impl Port for Stream {
+    fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<usize> {
+        // A zero limit would mean "for ever".
+        self.0.set_read_timeout(Some(timeout.max(Duration::from_millis(1))))?;
+        match self.0.read(buffer) {
+            Ok(0) => Err(io::Error::new(io::ErrorKind::BrokenPipe, "the peer closed the connection")),
+            Ok(len) => Ok(len),
+            Err(error) if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut) => {
+                Ok(0)
+            }
+            Err(error) => Err(error),
+        }
+    }
+
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.0.write_all(bytes)
+    }
+}
+
+/// One master at a time; when it leaves, the next may come.
+struct Listener {
+    listener: TcpListener,
+    stream: Option<Stream>,
+}
+
+impl Port for Listener {
+    fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<usize> {
+        if let Some(stream) = &mut self.stream {
+            let received = stream.receive(buffer, timeout);
+            if received.is_err() {
+                self.stream = None;
+            }
+            return Ok(received.unwrap_or(0));
+        }
+        match self.listener.accept() {
+            Ok((stream, _)) => {
+                stream.set_nonblocking(false)?;
+                stream.set_nodelay(true)?;
+                self.stream = Some(Stream(stream));
+            }
+            Err(error) if error.kind() == io::ErrorKind::WouldBlock => std::thread::sleep(timeout),
+            Err(error) => return Err(error),
+        }
+        Ok(0)
+    }
+
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        if let Some(stream) = &mut self.stream
+            && stream.send(bytes).is_err()
+        {
+            self.stream = None;
+        }
+        Ok(())
+    }
+}
