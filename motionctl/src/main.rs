@@ -1,2 +1,62 @@
-//! motionctl
-fn main() {}
+//! `motionctl`: LB2 functions, parameters, and virtual devices, from the command line.
+//!
+//! Exit status: 0 done or equal, 1 differs or a check failed, 2 usage, 3 no answer in time, 4 refused
+//! by the device, 5 port or file trouble.
+
+// The program, with motion-io, is what reads the machine's clock.
+#![allow(clippy::disallowed_methods)]
+
+mod cli;
+mod connect;
+mod demo;
+mod exit;
+mod image;
+mod lb2;
+mod output;
+mod params;
+mod sim;
+
+use std::process::ExitCode;
+
+use clap::{CommandFactory, Parser};
+use cli::{Cli, Command};
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let out = output::Output::new(&cli.global);
+    let done = match cli.command {
+        Command::Demo => demo::run(&out),
+        Command::Sim { command } => sim::run(&out, &command),
+        Command::Ports => ports(&out),
+        Command::Lb2 { command } => lb2::run(&out, &cli.global, &command),
+        Command::Params { command } => params::run(&out, &cli.global, &command),
+        Command::Completions { shell } => {
+            clap_complete::generate(shell, &mut Cli::command(), "motionctl", &mut std::io::stdout());
+            Ok(())
+        }
+        Command::Man => clap_mangen::Man::new(Cli::command())
+            .render(&mut std::io::stdout())
+            .map_err(|error| exit::Exit::file("standard output", &error)),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(exit) => {
+            out.failed(&exit);
+            ExitCode::from(exit.status)
+        }
+    }
+}
+
+fn ports(out: &output::Output) -> Result<(), exit::Exit> {
+    let ports = motion_io::port::list().map_err(|error| exit::Exit::file("serial ports", &error))?;
+    let json = ports.iter().map(|(name, text)| serde_json::json!({ "name": name, "description": text }));
+    out.document(serde_json::json!({ "serial": json.collect::<Vec<_>>() }), || {
+        if ports.is_empty() {
+            println!("no serial ports found");
+        }
+        for (name, text) in &ports {
+            println!("{name}  {text}");
+        }
+    });
+    Ok(())
+}

@@ -1,0 +1,66 @@
+//! From the command line to a device that can be called.
+
+use core::time::Duration;
+
+use motion_io::endpoint::Endpoint;
+use motion_io::lb2::{Client, Remark, TIMES};
+use motion_io::port::{Role, open};
+
+use crate::cli::{Global, Line};
+use crate::exit::Exit;
+use crate::output::Output;
+
+/// Reads are repeated so often.
+const RETRIES: u8 = 2;
+
+/// What `--port`, the environment or the configuration names.
+pub(crate) fn endpoint(global: &Global, line: &Line) -> Result<Endpoint, Exit> {
+    let config = match &global.config {
+        Some(path) => {
+            let name = path.display().to_string();
+            let text = std::fs::read_to_string(path).map_err(|error| Exit::file(&name, &error))?;
+            text.parse::<toml_edit::DocumentMut>().map_err(|error| Exit::file(&name, &error))?
+        }
+        None => toml_edit::DocumentMut::new(),
+    };
+    let default = config.get("port").and_then(|item| item.as_str());
+    let written = line.port.as_deref().or(default).ok_or_else(|| {
+        Exit::usage("no port: --port EP, MOTIONCTL_PORT or `port` in the configuration file expected")
+    })?;
+    let named = config.get("endpoints").and_then(|table| table.get(written)).and_then(|item| item.as_str());
+    named
+        .unwrap_or(written)
+        .parse()
+        .map_err(|error: motion_io::endpoint::EndpointError| Exit::usage(error.to_string()))
+}
+
+/// Opens the port and selects the device.
+pub(crate) fn connect(out: &Output, global: &Global, line: &Line) -> Result<Client, Exit> {
+    let endpoint = endpoint(global, line)?;
+    let mut times = TIMES;
+    if let Some(seconds) = global.timeout {
+        times.answer = Duration::try_from_secs_f64(seconds)
+            .ok()
+            .filter(|timeout| !timeout.is_zero())
+            .ok_or_else(|| Exit::usage(format!("--timeout {seconds}: seconds above 0 expected")))?;
+    }
+    let port = open(&endpoint, Role::Master).map_err(|error| Exit::trouble(error.to_string()))?;
+    let mut client = Client::new(port, times, RETRIES);
+    if let Some(device) = line.device {
+        client.select(device).map_err(|error| Exit::from(error).context(&format!("device {device}")))?;
+    }
+    remarks(out, &mut client);
+    Ok(client)
+}
+
+/// Passes on what the line had to remark.
+pub(crate) fn remarks(out: &Output, client: &mut Client) {
+    for remark in client.take_remarks() {
+        out.remark(match remark {
+            Remark::SecondAnswer => {
+                "two devices answered: a device with number 0 always does, or two have the same number"
+            }
+            _ => "an answer came after its time; a longer --timeout may help",
+        });
+    }
+}

@@ -1,0 +1,102 @@
+//! What goes to standard output and standard error.
+
+use core::cell::RefCell;
+use std::io::{IsTerminal, Write};
+
+use indicatif::{ProgressBar, ProgressStyle};
+use serde_json::{Value, json};
+
+use crate::cli::{Color, Global};
+use crate::exit::Exit;
+
+/// Version of the JSON documents.
+const SCHEMA_VERSION: u32 = 1;
+
+#[derive(Debug)]
+pub(crate) struct Output {
+    pub(crate) json: bool,
+    quiet: bool,
+    color: bool,
+    /// Remarks go into the next document, or to standard error.
+    remarks: RefCell<Vec<String>>,
+}
+
+impl Output {
+    pub(crate) fn new(global: &Global) -> Self {
+        let color = match global.color {
+            Color::Always => true,
+            Color::Never => false,
+            Color::Auto => std::env::var_os("NO_COLOR").is_none() && std::io::stderr().is_terminal(),
+        };
+        Self { json: global.json, quiet: global.quiet, color, remarks: RefCell::default() }
+    }
+
+    /// The one document of a command: JSON, or what `text` prints.
+    pub(crate) fn document(&self, document: Value, text: impl FnOnce()) {
+        if !self.json {
+            return text();
+        }
+        let mut whole = json!({ "schema_version": SCHEMA_VERSION });
+        let remarks = self.remarks.take();
+        if let (Some(whole), Value::Object(document)) = (whole.as_object_mut(), document) {
+            whole.extend(document);
+            if !remarks.is_empty() {
+                whole.insert("remarks".into(), json!(remarks));
+            }
+        }
+        println!("{whole}");
+        let _ = std::io::stdout().flush();
+    }
+
+    /// A line about what happens, for people.
+    pub(crate) fn say(&self, text: &str) {
+        if !self.json && !self.quiet {
+            println!("{text}");
+            let _ = std::io::stdout().flush();
+        }
+    }
+
+    /// Something worth knowing that is no result.
+    pub(crate) fn remark(&self, text: impl Into<String>) {
+        let text = text.into();
+        if self.json {
+            self.remarks.borrow_mut().push(text);
+        } else {
+            eprintln!("note: {text}");
+        }
+    }
+
+    pub(crate) fn failed(&self, exit: &Exit) {
+        let (red, plain) = if self.color { ("\x1b[31m", "\x1b[0m") } else { ("", "") };
+        eprintln!("{red}error:{plain} {}", exit.message);
+    }
+
+    /// A progress bar on standard error, where that is a terminal.
+    pub(crate) fn progress(&self, what: &'static str, len: usize) -> ProgressBar {
+        if self.quiet || self.json || !std::io::stderr().is_terminal() {
+            return ProgressBar::hidden();
+        }
+        let bar = ProgressBar::new(len as u64).with_message(what);
+        if let Ok(style) = ProgressStyle::with_template("{msg:12} [{bar:40}] {pos}/{len}  {eta}") {
+            bar.set_style(style);
+        }
+        bar
+    }
+
+    /// Asks on a terminal; without one, `--yes` must have been given.
+    pub(crate) fn confirm(&self, yes: bool, question: &str) -> Result<(), Exit> {
+        if yes {
+            return Ok(());
+        }
+        if !std::io::stdin().is_terminal() {
+            return Err(Exit::usage(format!("{question} Without a terminal to ask on, --yes must say so")));
+        }
+        eprint!("{question} [y/N] ");
+        let mut answer = String::new();
+        std::io::stdin().read_line(&mut answer).map_err(|error| Exit::file("standard input", &error))?;
+        match answer.trim() {
+            "y" | "Y" | "yes" => Ok(()),
+            _ => Err(Exit::check("not done")),
+        }
+    }
+}
