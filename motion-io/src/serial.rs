@@ -1,7 +1,6 @@
 //! Serial ports of the machine.
 
 use core::time::Duration;
-use std::fs::File;
 use std::io::{self, Read, Write};
 use std::path::Path;
 
@@ -10,15 +9,11 @@ use serialport::{DataBits, FlowControl, SerialPort, StopBits};
 use crate::endpoint::{Endpoint, Parity, Settings};
 use crate::port::{OpenError, Port};
 
-struct Serial {
-    port: Box<dyn SerialPort>,
-    /// Says to other programs of ours that the port is in use; the system's own exclusive mode does
-    /// not hold for the superuser.
-    _lock: Option<File>,
-}
+struct Serial(Box<dyn SerialPort>);
 
 pub(crate) fn open(endpoint: &Endpoint, path: &str, settings: &Settings) -> Result<Box<dyn Port>, OpenError> {
-    let lock = lock(endpoint, path)?;
+    #[cfg(unix)]
+    check(endpoint, path)?;
     let parity = match settings.parity {
         // A pseudo-terminal has no parity bits and refuses the setting.
         _ if is_pseudo_terminal(path) => serialport::Parity::None,
@@ -36,33 +31,19 @@ pub(crate) fn open(endpoint: &Endpoint, path: &str, settings: &Settings) -> Resu
         .map_err(|error| failed(endpoint, path, error))?;
     // What came before we listened is nobody's answer.
     port.clear(serialport::ClearBuffer::Input).map_err(|error| failed(endpoint, path, error))?;
-    Ok(Box::new(Serial { port, _lock: lock }))
+    Ok(Box::new(Serial(port)))
 }
 
+/// What the system's error for such a file would not say.
 #[cfg(unix)]
-fn lock(endpoint: &Endpoint, path: &str) -> Result<Option<File>, OpenError> {
-    use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
-    // O_NOCTTY | O_NONBLOCK: neither take the terminal over nor wait for a carrier.
-    const FLAGS: i32 = 0o400 | 0o4000;
+fn check(endpoint: &Endpoint, path: &str) -> Result<(), OpenError> {
+    use std::os::unix::fs::FileTypeExt;
     let found = std::fs::metadata(path).map_err(|error| OpenError::new(endpoint, error))?;
-    if !found.file_type().is_char_device() {
-        return Err(OpenError::NotSerial { endpoint: endpoint.to_string() });
+    if found.file_type().is_char_device() {
+        Ok(())
+    } else {
+        Err(OpenError::NotSerial { endpoint: endpoint.to_string() })
     }
-    let file = File::options()
-        .read(true)
-        .custom_flags(FLAGS)
-        .open(path)
-        .map_err(|error| OpenError::new(endpoint, error))?;
-    match file.try_lock() {
-        Ok(()) => Ok(Some(file)),
-        Err(std::fs::TryLockError::WouldBlock) => Err(OpenError::Busy { endpoint: endpoint.to_string() }),
-        Err(std::fs::TryLockError::Error(error)) => Err(OpenError::new(endpoint, error)),
-    }
-}
-
-#[cfg(not(unix))]
-fn lock(_: &Endpoint, _: &str) -> Result<Option<File>, OpenError> {
-    Ok(None)
 }
 
 fn is_pseudo_terminal(path: &str) -> bool {
@@ -82,8 +63,8 @@ fn failed(endpoint: &Endpoint, path: &str, error: serialport::Error) -> OpenErro
 
 impl Port for Serial {
     fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<usize> {
-        self.port.set_timeout(timeout).map_err(io::Error::from)?;
-        match self.port.read(buffer) {
+        self.0.set_timeout(timeout).map_err(io::Error::from)?;
+        match self.0.read(buffer) {
             // The system says "end of file" for a line that is gone, "timed out" for a silent one.
             Ok(0) => Err(io::Error::new(io::ErrorKind::BrokenPipe, "the port is gone")),
             Ok(len) => Ok(len),
@@ -94,9 +75,9 @@ impl Port for Serial {
     }
 
     fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
-        self.port.set_timeout(Duration::from_secs(5)).map_err(io::Error::from)?;
-        self.port.write_all(bytes)?;
-        self.port.flush()
+        self.0.set_timeout(Duration::from_secs(5)).map_err(io::Error::from)?;
+        self.0.write_all(bytes)?;
+        self.0.flush()
     }
 }
 
