@@ -1,0 +1,113 @@
+//! The real program against a real pseudo-terminal.
+
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdout, Command, Output, Stdio};
+
+/// A directory of its own for one test.
+pub struct Bench {
+    pub directory: tempfile::TempDir,
+}
+
+impl Bench {
+    pub fn new() -> Self {
+        Self { directory: tempfile::tempdir().unwrap() }
+    }
+
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.directory.path().join(name)
+    }
+
+    pub fn run(&self, arguments: &[&str]) -> Ran {
+        let output = Command::new(env!("CARGO_BIN_EXE_motionctl"))
+            .args(arguments)
+            .current_dir(self.directory.path())
+            .env_remove("MOTIONCTL_PORT")
+            .env_remove("MOTIONCTL_CONFIG")
+            .stdin(Stdio::null())
+            .output()
+            .unwrap();
+        Ran(output)
+    }
+
+    /// A virtual controller on LINE, ready to answer, with its flash in FLASH.
+    pub fn controller(&self, more: &[&str]) -> Controller {
+        let mut arguments = vec!["sim", "controller", "--serial", "pty:LINE", "--state", "FLASH"];
+        arguments.extend(more);
+        let mut child = Command::new(env!("CARGO_BIN_EXE_motionctl"))
+            .args(arguments)
+            .current_dir(self.directory.path())
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut said = BufReader::new(child.stdout.take().unwrap());
+        let mut line = String::new();
+        said.read_line(&mut line).unwrap();
+        assert!(line.contains("listening on pty:LINE"), "{line:?}");
+        Controller { child, _said: said }
+    }
+}
+
+/// A running virtual controller; killed, as by a power failure, when dropped.
+pub struct Controller {
+    child: Child,
+    _said: BufReader<ChildStdout>,
+}
+
+impl Controller {
+    pub fn kill(mut self) {
+        self.end();
+    }
+
+    fn end(&mut self) {
+        // SIGKILL: nothing is tidied up.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+impl Drop for Controller {
+    fn drop(&mut self) {
+        self.end();
+    }
+}
+
+/// What a command left.
+pub struct Ran(pub Output);
+
+impl Ran {
+    pub fn stdout(&self) -> String {
+        String::from_utf8_lossy(&self.0.stdout).into_owned()
+    }
+
+    pub fn stderr(&self) -> String {
+        String::from_utf8_lossy(&self.0.stderr).into_owned()
+    }
+
+    pub fn json(&self) -> serde_json::Value {
+        let value: serde_json::Value = serde_json::from_slice(&self.0.stdout).unwrap();
+        assert_eq!(value["schema_version"], 1);
+        value
+    }
+
+    #[track_caller]
+    pub fn ends(self, status: i32) -> Self {
+        assert_eq!(self.0.status.code(), Some(status), "{}\n{}", self.stdout(), self.stderr());
+        self
+    }
+
+    #[track_caller]
+    pub fn says(self, words: &str) -> Self {
+        let all = self.stdout() + &self.stderr();
+        assert!(all.contains(words), "{words:?} expected in:\n{all}");
+        self
+    }
+}
+
+/// Replaces a text in a file.
+pub fn edit(path: &Path, from: &str, to: &str) {
+    let text = std::fs::read_to_string(path).unwrap();
+    assert!(text.contains(from), "{from:?} is not in {}", path.display());
+    std::fs::write(path, text.replacen(from, to, 1)).unwrap();
+}
