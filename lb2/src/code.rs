@@ -87,9 +87,9 @@ impl ErrorCode {
 codes! {
     /// Number of a stored failure (manual A 4.3.4.2 and Appendix 1, 50h).
     Failure, "unknown failure" {
-        /// Following error above [696].
+        /// Following error above `[696]`.
         DELTA_S_MAX = 5, "DeltaS > DeltaS max.";
-        /// Following error below [702].
+        /// Following error below `[702]`.
         DELTA_S_MIN = 6, "DeltaS < DeltaS min.";
         /// Serial line.
         STOP_BIT = 26, "stop bit error";

@@ -26,7 +26,7 @@ pub struct LoaderAnswer<'a> {
 /// before a method is called; the other way round, nothing that a method returns can make the
 /// engine fail.
 pub trait Device {
-    /// Number 0…31 (parameter [005]); 0 answers to every selection.
+    /// Number 0…31 (parameter `[005]`); 0 answers to every selection.
     fn device_number(&self) -> u8;
     /// 40h: model number in binary and greatest number of axes.
     fn device_type(&self) -> (u16, u8);

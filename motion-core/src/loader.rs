@@ -30,7 +30,7 @@ pub const UNUSED: (LoaderCode, &str) = (LoaderCode(0x80), "No such parameter");
 pub const RANGE: (LoaderCode, &str) = (LoaderCode(0x81), "Value out of range");
 /// A value was not taken because this instance has no such choice (6.5.1, 6.6.1, 6.7.1).
 pub const CHOICE: (LoaderCode, &str) = (LoaderCode(0x82), "Choice not available here");
-/// A value was taken that needs the device switched on again ([302], [303]; 6.5.1).
+/// A value was taken that needs the device switched on again (`[302]`, `[303]`; 6.5.1).
 pub const SWITCH_ON: (LoaderCode, &str) = (LoaderCode(0x01), "Effective after switching on again");
 /// A value was taken that needs a CAN bus scan (4.3.4.4, 6.6.1.3, 6.7.1).
 pub const SCAN: (LoaderCode, &str) = (LoaderCode(0x02), "CAN bus must be scanned again");
@@ -262,7 +262,7 @@ mod tests {
         assert_eq!(findings(&[]), []);
     }
 
-    /// Manual A 6.11: the inputs must be deactivated before [000] is reduced.
+    /// Manual A 6.11: the inputs must be deactivated before `[000]` is reduced.
     #[test]
     fn each_rule_names_the_parameter() {
         assert_eq!(findings(&[(0, 2)]), [(109, 0x83)]);

@@ -89,7 +89,7 @@ pub(crate) enum Sim {
         /// File for flash and retained values; absent: in memory
         #[arg(long, value_name = "FILE")]
         state: Option<PathBuf>,
-        /// Device number, as parameter [005] would set it
+        /// Device number, as parameter `[005]` would set it
         #[arg(long, value_name = "N")]
         device: Option<u8>,
     },

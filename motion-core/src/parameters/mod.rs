@@ -1,7 +1,7 @@
 //! The system parameters of manual A, chapter 6: one table, from which everything that knows
 //! parameters reads (loader, LB2 30h…35h, files, the program's tree).
 //!
-//! A parameter is addressed by its number [000]…[971], of which 606 are in use. Values are `i32` in
+//! A parameter is addressed by its number `[000]`…`[971]`, of which 606 are in use. Values are `i32` in
 //! display units: the decimal point is ignored (Appendix 1: 50.83 = 5083), and a characteristic's
 //! value is the number of the choice.
 

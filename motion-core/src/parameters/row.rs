@@ -142,7 +142,7 @@ pub enum Decimals {
     /// Always so many.
     Fixed(u8),
     /// As many as the parameter "Display decimal pnt." of the same instance says; this is the number
-    /// of its first instance: [013], [020] or [026].
+    /// of its first instance: `[013]`, `[020]` or `[026]`.
     As(u16),
 }
 

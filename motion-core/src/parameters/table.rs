@@ -1,4 +1,4 @@
-//! Every system parameter [000]…[971] of manual A, chapter 6, one row a parameter, in the order of
+//! Every system parameter `[000]`…`[971]` of manual A, chapter 6, one row a parameter, in the order of
 //! its numbers (6.10).
 //!
 //! The manual's bold print, which marks the defaults, is lost: where neither its text nor its other

@@ -5,20 +5,20 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdout, Command, Output, Stdio};
 
 /// A directory of its own for one test.
-pub struct Bench {
-    pub directory: tempfile::TempDir,
+pub(crate) struct Bench {
+    pub(crate) directory: tempfile::TempDir,
 }
 
 impl Bench {
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self { directory: tempfile::tempdir().unwrap() }
     }
 
-    pub fn path(&self, name: &str) -> PathBuf {
+    pub(crate) fn path(&self, name: &str) -> PathBuf {
         self.directory.path().join(name)
     }
 
-    pub fn run(&self, arguments: &[&str]) -> Ran {
+    pub(crate) fn run(&self, arguments: &[&str]) -> Ran {
         let output = Command::new(env!("CARGO_BIN_EXE_motionctl"))
             .args(arguments)
             .current_dir(self.directory.path())
@@ -31,7 +31,7 @@ impl Bench {
     }
 
     /// A virtual controller on LINE, ready to answer, with its flash in FLASH.
-    pub fn controller(&self, more: &[&str]) -> Controller {
+    pub(crate) fn controller(&self, more: &[&str]) -> Controller {
         let mut arguments = vec!["sim", "controller", "--serial", "pty:LINE", "--state", "FLASH"];
         arguments.extend(more);
         let mut child = Command::new(env!("CARGO_BIN_EXE_motionctl"))
@@ -50,13 +50,13 @@ impl Bench {
 }
 
 /// A running virtual controller; killed, as by a power failure, when dropped.
-pub struct Controller {
+pub(crate) struct Controller {
     child: Child,
     _said: BufReader<ChildStdout>,
 }
 
 impl Controller {
-    pub fn kill(mut self) {
+    pub(crate) fn kill(mut self) {
         self.end();
     }
 
@@ -74,31 +74,31 @@ impl Drop for Controller {
 }
 
 /// What a command left.
-pub struct Ran(pub Output);
+pub(crate) struct Ran(pub Output);
 
 impl Ran {
-    pub fn stdout(&self) -> String {
+    pub(crate) fn stdout(&self) -> String {
         String::from_utf8_lossy(&self.0.stdout).into_owned()
     }
 
-    pub fn stderr(&self) -> String {
+    pub(crate) fn stderr(&self) -> String {
         String::from_utf8_lossy(&self.0.stderr).into_owned()
     }
 
-    pub fn json(&self) -> serde_json::Value {
+    pub(crate) fn json(&self) -> serde_json::Value {
         let value: serde_json::Value = serde_json::from_slice(&self.0.stdout).unwrap();
         assert_eq!(value["schema_version"], 1);
         value
     }
 
     #[track_caller]
-    pub fn ends(self, status: i32) -> Self {
+    pub(crate) fn ends(self, status: i32) -> Self {
         assert_eq!(self.0.status.code(), Some(status), "{}\n{}", self.stdout(), self.stderr());
         self
     }
 
     #[track_caller]
-    pub fn says(self, words: &str) -> Self {
+    pub(crate) fn says(self, words: &str) -> Self {
         let all = self.stdout() + &self.stderr();
         assert!(all.contains(words), "{words:?} expected in:\n{all}");
         self
@@ -106,7 +106,7 @@ impl Ran {
 }
 
 /// Replaces a text in a file.
-pub fn edit(path: &Path, from: &str, to: &str) {
+pub(crate) fn edit(path: &Path, from: &str, to: &str) {
     let text = std::fs::read_to_string(path).unwrap();
     assert!(text.contains(from), "{from:?} is not in {}", path.display());
     std::fs::write(path, text.replacen(from, to, 1)).unwrap();
