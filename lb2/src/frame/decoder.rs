@@ -2,7 +2,11 @@
 
 use core::fmt;
 
+#[cfg(target_pointer_width = "64")]
+use super::wide::{self, Front, SLACK};
 use super::{Frame, HEAD_0, HEAD_1, MAX_BLOCK, count_head, xor};
+#[cfg(not(target_pointer_width = "64"))]
+const SLACK: usize = 0;
 
 /// What the decoder found next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -92,7 +96,7 @@ impl fmt::Display for Damage {
 #[derive(Debug, Clone)]
 pub struct Decoder {
     /// Bytes held, each doubled 82h once: of the open block, or still to be searched for a head.
-    units: [u8; MAX_BLOCK],
+    units: [u8; MAX_BLOCK + SLACK],
     start: usize,
     end: usize,
     /// Wire offset of `units[start]`.
@@ -130,7 +134,7 @@ impl Decoder {
     #[must_use]
     pub const fn new() -> Self {
         Self {
-            units: [0; MAX_BLOCK],
+            units: [0; MAX_BLOCK + SLACK],
             start: 0,
             end: 0,
             base: 0,
@@ -167,7 +171,28 @@ impl Decoder {
     /// }
     /// assert_eq!((frames, decoder.discarded()), (1, 1));
     /// ```
+    #[inline]
     pub fn decode<'a>(&'a mut self, input: &'a [u8]) -> (usize, Option<Item<'a>>) {
+        #[cfg(target_pointer_width = "64")]
+        if self.idle()
+            && let Some(front) = wide::front(input)
+            && let Some(raw) = input.get(2..)
+        {
+            match front {
+                Front::Plain(len) => {
+                    let offset = self.whole(len);
+                    let frame = Frame { block: raw.get(..len).unwrap_or(&[]) };
+                    return (2 + len, Some(Item::Frame { offset, frame }));
+                }
+                Front::Stuffed { len, xor } => {
+                    if let Some(wire) = wide::stuffed(raw, len, xor, &mut self.units) {
+                        let offset = self.whole(wire);
+                        let frame = Frame { block: self.units.get(..len).unwrap_or(&[]) };
+                        return (2 + wire, Some(Item::Frame { offset, frame }));
+                    }
+                }
+            }
+        }
         let (taken, found) = self.step(input);
         let item = match found {
             None => None,
@@ -216,6 +241,22 @@ impl Decoder {
         self.discarded.saturating_add(frontier.saturating_sub(self.accounted))
     }
 
+    /// Nothing is held: the next byte stands outside of any telegram.
+    #[inline]
+    fn idle(&self) -> bool {
+        !(self.in_block | self.escape | self.gap | (self.start < self.end))
+    }
+
+    /// A whole telegram, `len` bytes after its head, is taken: returns the offset of its head.
+    #[inline]
+    fn whole(&mut self, len: usize) -> u64 {
+        let offset = self.position;
+        self.position += 2 + len as u64;
+        self.good(offset, self.position);
+        offset
+    }
+
+    #[inline(never)]
     fn step(&mut self, input: &[u8]) -> (usize, Option<Found>) {
         let mut taken = 0;
         loop {
@@ -246,6 +287,11 @@ impl Decoder {
             {
                 return (taken + len, Some(found));
             }
+            let run = self.block_run(input.get(taken..).unwrap_or(&[]));
+            if run > 0 {
+                taken += run;
+                continue;
+            }
             let Some(&byte) = input.get(taken) else { return (taken, None) };
             let found = if self.in_block { self.block_byte(byte) } else { self.search_byte(byte) };
             if !matches!(found, ByteFound::Rejected(_)) {
@@ -273,9 +319,7 @@ impl Decoder {
         if number < 2 || block.contains(&HEAD_0) || xor(block) != 0 {
             return None;
         }
-        let offset = self.position;
-        self.position += 2 + len as u64;
-        self.good(offset, self.position);
+        let offset = self.whole(len);
         Some((2 + len, Found::Direct { offset, at: taken + 2, len }))
     }
 
@@ -340,6 +384,27 @@ impl Decoder {
         }
     }
 
+    /// Takes what the open block still wants up to the next 82h; returns how many bytes.
+    fn block_run(&mut self, rest: &[u8]) -> usize {
+        if !self.in_block || self.escape {
+            return 0;
+        }
+        let wanted = match self.units.first() {
+            Some(&number) if self.end > 0 => (usize::from(number) + 1).saturating_sub(self.end),
+            _ => 1,
+        };
+        let rest = rest.get(..wanted).unwrap_or(rest);
+        let run = rest.iter().position(|&byte| byte == HEAD_0).unwrap_or(rest.len());
+        let (Some(units), Some(rest)) = (self.units.get_mut(self.end..self.end + run), rest.get(..run))
+        else {
+            return 0;
+        };
+        units.copy_from_slice(rest);
+        self.end += run;
+        self.position += run as u64;
+        run
+    }
+
     fn block_byte(&mut self, byte: u8) -> ByteFound {
         match (self.escape, byte) {
             (false, HEAD_0) => {
@@ -380,6 +445,7 @@ impl Decoder {
         Some(Found::Damage(Damage { offset: self.accounted, kind: DamageKind::Garbage }))
     }
 
+    #[inline]
     fn good(&mut self, from: u64, to: u64) {
         self.discarded = self.discarded.saturating_add(from.saturating_sub(self.accounted));
         self.accounted = to;

@@ -36,7 +36,18 @@ pub enum EncodeError {
 ///
 /// # Errors
 /// [`EncodeError::TooLong`] for more than 253 data bytes, [`EncodeError::BufferTooSmall`].
+#[inline]
 pub fn encode(function: u8, data: &[u8], out: &mut [u8]) -> Result<usize, EncodeError> {
+    #[cfg(target_pointer_width = "64")]
+    if let Some(len) = super::wide::encode(function, data, out) {
+        return Ok(len);
+    }
+    encode_bytes(function, data, out)
+}
+
+/// Byte by byte: where the buffer is tight, and on processors without a faster path.
+#[inline(never)]
+fn encode_bytes(function: u8, data: &[u8], out: &mut [u8]) -> Result<usize, EncodeError> {
     let number = number(data)?;
     let len = out.len();
     let mut writer = Writer { out, at: 0, check: 0 };

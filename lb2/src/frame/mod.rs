@@ -10,6 +10,8 @@
 
 mod decoder;
 mod encode;
+#[cfg(target_pointer_width = "64")]
+mod wide;
 
 pub use decoder::{Damage, DamageKind, Decoder, Item};
 pub use encode::{EncodeError, encode, encoded_len};
