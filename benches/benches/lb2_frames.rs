@@ -7,7 +7,7 @@
 //! as much to stuff. Ours carries head, number, function and check byte besides, and verifies them.
 //! The peers' frames are found by `memchr`.
 
-use std::hint::black_box;
+use core::hint::black_box;
 use std::process::ExitCode;
 
 use benches::{Contender, paired};
@@ -62,7 +62,7 @@ impl Data {
 
     fn iter(&self) -> impl Iterator<Item = &[u8]> {
         let mut start = 0;
-        self.ends.iter().map(move |&end| &self.bytes[std::mem::replace(&mut start, end)..end])
+        self.ends.iter().map(move |&end| &self.bytes[core::mem::replace(&mut start, end)..end])
     }
 
     /// The same with 00h in place of 82h.
