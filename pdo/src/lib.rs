@@ -5,8 +5,12 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod cob;
 mod frame;
+mod handled;
 mod node;
 
+pub use cob::{CobId, Service};
 pub use frame::Frame;
+pub use handled::Handled;
 pub use node::{NodeId, NodeIdError};
