@@ -39,6 +39,12 @@ impl Model {
         }
     }
 
+    /// Whether it has the inputs I4, I62, I63 and I54…I57 (3.8 to 3.10, 7.2).
+    #[must_use]
+    pub const fn has_extra_inputs(self) -> bool {
+        matches!(self, Self::Gel8231 | Self::Gel8236)
+    }
+
     /// The model with this number.
     #[must_use]
     pub fn from_number(number: u16) -> Option<Self> {

@@ -8,7 +8,11 @@ extern crate alloc;
 extern crate std;
 
 mod controller;
+pub mod failure;
+pub mod input;
+pub mod io;
 pub mod loader;
+pub mod output;
 pub mod parameters;
 pub mod storage;
 

@@ -1,0 +1,63 @@
+//! Failure numbers that manual A does not name, for what its operating system watches all the same.
+//!
+//! All are project-defined; they go into the same list as the manual's own (4.3.4.2) and are read over
+//! LB2 50h. A limit switch has the number of the error code that it gives a motion command (6.8.1.1).
+
+use lb2::code::Failure;
+
+/// Upper software limit `[930]` passed.
+pub const SW_LIMIT_PLUS: Failure = Failure(0x04);
+/// Lower software limit `[942]` passed.
+pub const SW_LIMIT_MINUS: Failure = Failure(0x08);
+/// Upper hardware limit switch `[954]`.
+pub const HW_LIMIT_PLUS: Failure = Failure(0x40);
+/// Lower hardware limit switch `[966]`.
+pub const HW_LIMIT_MINUS: Failure = Failure(0x80);
+/// An actual value input gives no reading: wire break, or no answer from a drive on the CAN bus.
+pub const READING_LOST: Failure = Failure(100);
+/// An actual value jumped by more than `[184]` and stayed there for more than `[191]` cycles (6.6.1).
+pub const ACTUAL_VALUE_JUMP: Failure = Failure(101);
+/// A drive on a CAN bus does not answer its guarding any more (6.5.1.1).
+pub const DRIVE_LOST: Failure = Failure(102);
+/// A drive on a CAN bus reports a fault.
+pub const DRIVE_FAULT: Failure = Failure(103);
+
+/// What a failure means: the manual's text, or this project's; `None` for a number of neither.
+#[must_use]
+pub const fn text(failure: Failure) -> Option<&'static str> {
+    match failure {
+        SW_LIMIT_PLUS => Some("upper software limit passed"),
+        SW_LIMIT_MINUS => Some("lower software limit passed"),
+        HW_LIMIT_PLUS => Some("upper hardware limit switch"),
+        HW_LIMIT_MINUS => Some("lower hardware limit switch"),
+        READING_LOST => Some("no reading from the actual value input"),
+        ACTUAL_VALUE_JUMP => Some("actual value jumped by more than Failure diff. MAX"),
+        DRIVE_LOST => Some("drive lost on the CAN bus"),
+        DRIVE_FAULT => Some("drive reports a fault"),
+        other => other.text(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn own_numbers_are_none_of_the_manuals() {
+        let own = [
+            SW_LIMIT_PLUS,
+            SW_LIMIT_MINUS,
+            HW_LIMIT_PLUS,
+            HW_LIMIT_MINUS,
+            READING_LOST,
+            ACTUAL_VALUE_JUMP,
+            DRIVE_LOST,
+            DRIVE_FAULT,
+        ];
+        for (at, failure) in own.iter().enumerate() {
+            assert!(failure.text().is_none() && text(*failure).is_some(), "{failure:?}");
+            assert!(!own[..at].contains(failure));
+        }
+        assert_eq!(text(Failure::DELTA_S_MAX), Some("DeltaS > DeltaS max."));
+    }
+}
