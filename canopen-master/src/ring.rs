@@ -16,10 +16,6 @@ impl<T: Copy, const N: usize> Ring<T, N> {
         self.len
     }
 
-    pub(crate) const fn is_full(&self) -> bool {
-        self.len >= N
-    }
-
     /// Gives the item back where there is no room.
     pub(crate) fn push(&mut self, item: T) -> Result<(), T> {
         let end = self.head + self.len;
@@ -54,7 +50,7 @@ mod tests {
             for item in 0..3 {
                 assert_eq!(ring.push(round + item), Ok(()));
             }
-            assert_eq!((ring.push(9), ring.is_full()), (Err(9), true));
+            assert_eq!((ring.push(9), ring.len()), (Err(9), 3));
             assert_eq!(ring.pop(), Some(round));
             assert_eq!(ring.push(7), Ok(()));
             assert_eq!([ring.pop(), ring.pop(), ring.pop()], [Some(round + 1), Some(round + 2), Some(7)]);
