@@ -3,4 +3,5 @@
 
 pub mod can;
 pub mod conversation;
+pub mod plant;
 pub mod serial;
