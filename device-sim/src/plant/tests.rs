@@ -27,7 +27,7 @@ fn second_order_drive_overshoots_by_its_damping() {
             peak.max(plant.velocity())
         })
     };
-    let expected = (-std::f64::consts::PI * 0.4 / (1.0f64 - 0.16).sqrt()).exp();
+    let expected = (-core::f64::consts::PI * 0.4 / (1.0f64 - 0.16).sqrt()).exp();
     close(peak(0.4) / 1000.0 - 1.0, expected, 0.01);
     close(peak(1.0), 1000.0, 1.0);
 }

@@ -7,10 +7,12 @@
 
 mod analog;
 mod digital;
+mod extension;
 mod pwm;
 
 pub use analog::{AnalogChannel, AnalogInputs, CHANNELS, MAX_PT100, MAX_READING, celsius_quarters};
 pub use digital::{DigitalInputs, DigitalOutputs, Terminal, TerminalError};
+pub use extension::{BusKind, ByteOrder, FieldBus, MAX_IMAGE, ProcessImage};
 pub use pwm::{MAX_FREQUENCY, Pwm};
 
 use crate::input::Encoder;
