@@ -1,0 +1,163 @@
+//! Frames of any CAN capture, one after the other.
+
+use std::io::Read;
+
+use super::asc::Asc;
+use super::candump::Candump;
+use super::columns::Columns;
+use super::input::{Input, Line};
+use super::pcap::{Packet, Pcap};
+use super::record::{Bus, Buses, Damage, Place, Record};
+use super::trc::Trc;
+use super::{CaptureError, Format};
+
+/// What a line gave.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Parsed {
+    /// The record is filled.
+    Frame,
+    /// A header, a comment, an empty line.
+    Nothing,
+    /// No frame, and why.
+    Damaged(&'static str),
+}
+
+/// What a capture gives next.
+#[derive(Debug)]
+pub enum Item<'a> {
+    /// A frame.
+    Frame(&'a Record),
+    /// A line or packet that gave none.
+    Damage(Damage),
+}
+
+/// A format that is read line by line.
+#[derive(Debug)]
+pub(super) enum TextParser {
+    Candump(Candump),
+    Asc(Asc),
+    Trc(Trc),
+    Columns(Columns),
+}
+
+impl TextParser {
+    pub(super) fn new(format: Format) -> Option<Self> {
+        Some(match format {
+            Format::Candump => Self::Candump(Candump::default()),
+            Format::Asc => Self::Asc(Asc::default()),
+            Format::Trc => Self::Trc(Trc::default()),
+            Format::Ixxat => Self::Columns(Columns::default()),
+            _ => return None,
+        })
+    }
+
+    #[inline]
+    pub(super) fn line(&mut self, line: &[u8], record: &mut Record, buses: &mut Buses) -> Parsed {
+        match self {
+            Self::Candump(parser) => parser.line(line, record, buses),
+            Self::Asc(parser) => parser.line(line, record, buses),
+            Self::Trc(parser) => parser.line(line, record, buses),
+            Self::Columns(parser) => parser.line(line, record, buses),
+        }
+    }
+}
+
+#[derive(Debug)]
+enum Parser {
+    Text(TextParser),
+    Pcap(Box<Pcap>),
+}
+
+/// Reads the frames of a capture as a stream.
+///
+/// Every line or packet that is no header, comment or blank gives one [`Item`].
+#[derive(Debug)]
+pub struct Reader<R> {
+    input: Input<R>,
+    format: Format,
+    parser: Parser,
+    record: Record,
+    buses: Buses,
+    line: u64,
+}
+
+impl<R: Read> Reader<R> {
+    pub(super) fn new(mut input: Input<R>, format: Format) -> Result<Self, CaptureError> {
+        let parser = match TextParser::new(format) {
+            Some(parser) => {
+                if input.peek(3)? == b"\xEF\xBB\xBF" {
+                    input.take(3);
+                }
+                Parser::Text(parser)
+            }
+            None => Parser::Pcap(Box::new(Pcap::open(&mut input)?)),
+        };
+        Ok(Self { input, format, parser, record: Record::EMPTY, buses: Buses::default(), line: 0 })
+    }
+
+    /// The format that is read.
+    #[must_use]
+    pub const fn format(&self) -> Format {
+        self.format
+    }
+
+    /// How the capture calls a bus of one of its records.
+    #[must_use]
+    pub fn bus_name(&self, bus: Bus) -> Option<&str> {
+        self.buses.name(bus)
+    }
+
+    /// The next frame or damage; `None` at the end.
+    ///
+    /// # Errors
+    /// [`CaptureError`] if reading fails.
+    #[inline]
+    #[allow(clippy::should_implement_trait, reason = "lends the record")]
+    pub fn next(&mut self) -> Result<Option<Item<'_>>, CaptureError> {
+        loop {
+            let (parsed, place) = match &mut self.parser {
+                Parser::Text(parser) => {
+                    let Some(line) = self.input.line()? else { return Ok(None) };
+                    self.line += 1;
+                    match line {
+                        Line::Whole(range) => {
+                            let line = self.input.held(range);
+                            match parser.line(line, &mut self.record, &mut self.buses) {
+                                Parsed::Frame => break,
+                                Parsed::Nothing => continue,
+                                Parsed::Damaged(reason) => {
+                                    let damage =
+                                        Damage { place: Place::Line(self.line), reason, text: excerpt(line) };
+                                    return Ok(Some(Item::Damage(damage)));
+                                }
+                            }
+                        }
+                        Line::TooLong => {
+                            (Parsed::Damaged("a line of more than 65,536 bytes"), Place::Line(self.line))
+                        }
+                    }
+                }
+                Parser::Pcap(pcap) => match pcap.next(&mut self.input, &mut self.record, &mut self.buses)? {
+                    Packet::End => return Ok(None),
+                    Packet::Frame => break,
+                    Packet::Damaged { number, reason } => (Parsed::Damaged(reason), Place::Packet(number)),
+                },
+            };
+            if let Parsed::Damaged(reason) = parsed {
+                return Ok(Some(Item::Damage(Damage { place, reason, text: String::new() })));
+            }
+        }
+        Ok(Some(Item::Frame(&self.record)))
+    }
+}
+
+/// The start of a line, for people.
+pub(super) fn excerpt(line: &[u8]) -> String {
+    const MOST: usize = 80;
+    let line = line.trim_ascii();
+    let mut text = String::from_utf8_lossy(line.get(..MOST).unwrap_or(line)).into_owned();
+    if line.len() > MOST {
+        text.push('…');
+    }
+    text
+}

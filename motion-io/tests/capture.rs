@@ -1,0 +1,388 @@
+//! Reading and writing capture files through the public interface.
+
+use std::path::Path;
+
+use motion_io::capture::{
+    Capture, Direction, Format, Frame, FrameKind, Item, Record, Time, WriteFormat, Writer, open,
+};
+
+const DATA: FrameKind = FrameKind::Data;
+const FD: FrameKind = FrameKind::Fd { bit_rate_switch: true, error_passive: false };
+
+/// A frame and its bus.
+type Named = (Option<String>, Record);
+/// Nanoseconds, bus, direction, frame.
+type Expected<'a> = (Option<i64>, Option<&'a str>, Option<Direction>, Frame);
+
+/// Every frame with its bus, and every damage as text.
+fn read(content: &[u8]) -> (Format, Vec<Named>, Vec<String>) {
+    let Capture::Can(mut reader) = open(content).expect("a capture") else { panic!("LB2") };
+    let (mut frames, mut damage) = (Vec::new(), Vec::new());
+    loop {
+        match reader.next().expect("memory does not fail") {
+            Some(Item::Frame(record)) => {
+                let record = *record;
+                frames.push((record.bus.and_then(|bus| reader.bus_name(bus)).map(str::to_owned), record));
+            }
+            Some(Item::Damage(found)) => damage.push(found.to_string()),
+            None => return (reader.format(), frames, damage),
+        }
+    }
+}
+
+fn expect(content: &str, expected: &[Expected<'_>]) {
+    let (_, frames, damage) = read(content.as_bytes());
+    assert_eq!(damage, Vec::<String>::new(), "{content}");
+    let frames: Vec<_> = frames
+        .iter()
+        .map(|(bus, record)| (record.time.map(|time| time.0), bus.as_deref(), record.direction, record.frame))
+        .collect();
+    assert_eq!(frames, expected, "{content}");
+}
+
+fn frame(id: u32, extended: bool, kind: FrameKind, data: &[u8]) -> Frame {
+    Frame::new(id, extended, kind, data).unwrap()
+}
+
+fn standard(id: u32, data: &[u8]) -> Frame {
+    frame(id, false, DATA, data)
+}
+
+fn remote(id: u32, len: usize) -> Frame {
+    frame(id, false, FrameKind::Remote, &vec![0; len])
+}
+
+#[test]
+fn candump_log() {
+    expect(
+        "(1436509052.249713) vcan0 044#2A366C2BBA\n\
+         (1436509052.449847) vcan0 1F334455#1122334455667788 T\n\
+         (1436509052.5) can1 701#R\n\
+         (1) can1 701#R1 R\n\
+         (0.123456789) can1 123##1AABB\n\
+         (0.0) can1 20000004#0004000000000000\n\
+         (0.0) can1 123#1122334455667788_9\r\n\
+         5A1#11.2233.44556677.88\n",
+        &[
+            (
+                Some(1_436_509_052_249_713_000),
+                Some("vcan0"),
+                None,
+                standard(0x44, &[0x2A, 0x36, 0x6C, 0x2B, 0xBA]),
+            ),
+            (
+                Some(1_436_509_052_449_847_000),
+                Some("vcan0"),
+                Some(Direction::Tx),
+                frame(0x1F33_4455, true, DATA, &[0x11, 0x22, 0x33, 0x44, 0x55, 0x66, 0x77, 0x88]),
+            ),
+            (Some(1_436_509_052_500_000_000), Some("can1"), None, remote(0x701, 0)),
+            (Some(1_000_000_000), Some("can1"), Some(Direction::Rx), remote(0x701, 1)),
+            (Some(123_456_789), Some("can1"), None, frame(0x123, false, FD, &[0xAA, 0xBB])),
+            (Some(0), Some("can1"), None, frame(4, false, FrameKind::Error, &[0, 4, 0, 0, 0, 0, 0, 0])),
+            (Some(0), Some("can1"), None, standard(0x123, &[0x11, 0x22, 0x33, 0x44, 0x55, 0x66, 0x77, 0x88])),
+            (None, None, None, standard(0x5A1, &[0x11, 0x22, 0x33, 0x44, 0x55, 0x66, 0x77, 0x88])),
+        ],
+    );
+}
+
+#[test]
+fn candump_screen() {
+    let eight = standard(0x581, &[0x4B, 0x41, 0x60, 0, 0x18, 2, 0x8F, 0xAF]);
+    expect(
+        "  can0  581   [8]  4B 41 60 00 18 02 8F AF\n\
+         \x20(000.000003)  vcan0  581   [8]  4B 41 60 00 18 02 8F AF   'KA`.....'\n\
+         \x20(2015-07-10 08:57:32.249713)  can0  TX - -  581   [8]  4B 41 60 00 18 02 8F AF\n\
+         581   [8]  4B 41 60 00 18 02 8F AF   # upload\n\
+         RX 701   [1]  remote request\n\
+         can0  080   [0]\n\
+         can0  1F334455   [2]  11 22\n\
+         can0  TX B -  123  [12]  00 01 02 03 04 05 06 07 08 09 0A 0B\n\
+         can0  20000004   [8]  00 04 00 00 00 00 00 00   ERRORFRAME\n\
+         \tcontroller-problem{rx-error-warning}\n\
+         can0  123   [2]  22`11\n\
+         \x1b[32m  can0  123\x1b[0m   [2]  11 22\n",
+        &[
+            (None, Some("can0"), None, eight),
+            (Some(3000), Some("vcan0"), None, eight),
+            (Some(1_436_518_652_249_713_000), Some("can0"), Some(Direction::Tx), eight),
+            (None, None, None, eight),
+            (None, None, Some(Direction::Rx), remote(0x701, 1)),
+            (None, Some("can0"), None, standard(0x80, &[])),
+            (None, Some("can0"), None, frame(0x1F33_4455, true, DATA, &[0x11, 0x22])),
+            (
+                None,
+                Some("can0"),
+                Some(Direction::Tx),
+                frame(0x123, false, FD, &[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11]),
+            ),
+            (None, Some("can0"), None, frame(4, false, FrameKind::Error, &[0, 4, 0, 0, 0, 0, 0, 0])),
+            (None, Some("can0"), None, standard(0x123, &[0x11, 0x22])),
+            (None, Some("can0"), None, standard(0x123, &[0x11, 0x22])),
+        ],
+    );
+}
+
+#[test]
+fn vector_asc() {
+    let header = "date Mon Feb 6 10:00:00.000 am 2023\nbase hex  timestamps absolute\n\
+                  internal events logged\n// version 8.5.0\nBegin Triggerblock\n   0.000000 Start of measurement\n";
+    let lines = "   0.002500 1  181             Rx   d 2 00 FF  Length = 120000 BitCount = 62 ID = 385\n\
+                 0.003 2  18FEF1FEx       Tx   d 1 07\n\
+                 0.004 1  701             Tx   r\n\
+                 0.005 1  701             Tx   r 1\n\
+                 0.006 1  ErrorFrame\n\
+                 0.007 1  Statistic: D 1 R 0 XD 0 XR 0 E 0 O 0 B 1.5%\n\
+                 0.008 CANFD   1 Rx        123  Name  1 0 9 12 00 01 02 03 04 05 06 07 08 09 0A 0B 130000 130 303000 5 0 0 0\n\
+                 0.009 CANFD   1 Tx        123  0 0 1 1 AA 130000 130 0 50000 0 0 0 0\nEnd TriggerBlock\n";
+    expect(
+        &format!("{header}{lines}"),
+        &[
+            (Some(2_500_000), Some("1"), Some(Direction::Rx), standard(0x181, &[0, 0xFF])),
+            (Some(3_000_000), Some("2"), Some(Direction::Tx), frame(0x18FE_F1FE, true, DATA, &[7])),
+            (Some(4_000_000), Some("1"), Some(Direction::Tx), remote(0x701, 0)),
+            (Some(5_000_000), Some("1"), Some(Direction::Tx), remote(0x701, 1)),
+            (Some(6_000_000), Some("1"), None, frame(0, false, FrameKind::Error, &[])),
+            (
+                Some(8_000_000),
+                Some("1"),
+                Some(Direction::Rx),
+                frame(0x123, false, FD, &[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11]),
+            ),
+            (Some(9_000_000), Some("1"), Some(Direction::Tx), standard(0x123, &[0xAA])),
+        ],
+    );
+    expect(
+        "base dec  timestamps absolute\n0.5 1  385  Rx d 3 0 255 16\n",
+        &[(Some(500_000_000), Some("1"), Some(Direction::Rx), standard(0x181, &[0, 255, 16]))],
+    );
+}
+
+#[test]
+fn peak_trc_of_every_version() {
+    let rx = Some(Direction::Rx);
+    let twelve = frame(0x123, false, FD, &[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11]);
+    expect(
+        ";$FILEVERSION=1.0\n     1)  1841  0001  8  00 00 00 00 00 00 00 01\n     2)  1842 18EFC034  1  7F\n",
+        &[
+            (Some(1_841_000_000), None, None, standard(1, &[0, 0, 0, 0, 0, 0, 0, 1])),
+            (Some(1_842_000_000), None, None, frame(0x18EF_C034, true, DATA, &[0x7F])),
+        ],
+    );
+    expect(
+        ";$FILEVERSION=1.1\n     6)       234.7  Rx         070A  1  RTR\n     7)       236.3  Tx         070A  1  85 \n",
+        &[
+            (Some(234_700_000), None, rx, remote(0x70A, 1)),
+            (Some(236_300_000), None, Some(Direction::Tx), standard(0x70A, &[0x85])),
+        ],
+    );
+    expect(
+        ";$FILEVERSION=1.3\n     1)   1059.900 2  Rx   0300 -  2    00 01\n",
+        &[(Some(1_059_900_000), Some("2"), rx, standard(0x300, &[0, 1]))],
+    );
+    expect(
+        ";$FILEVERSION=2.0\n;$COLUMNS=N,O,T,I,d,l,D\n  1  1059.900 DT  0300 Rx 2  00 01\n\
+         \x20 2 1060.1 RR 0701 Rx 1\n 3 1061 FB 0123 Rx 12 00 01 02 03 04 05 06 07 08 09 0A 0B\n",
+        &[
+            (Some(1_059_900_000), None, rx, standard(0x300, &[0, 1])),
+            (Some(1_060_100_000), None, rx, remote(0x701, 1)),
+            (Some(1_061_000_000), None, rx, twelve),
+        ],
+    );
+    expect(
+        ";$FILEVERSION=2.1\n;$COLUMNS=N,O,T,B,I,d,R,L,D\n  1  1059.900 DT 1 0300 Rx - 2  00 01\n\
+         \x20 2  1060.100 ER 2 - Rx - 4  04 00 02 00\n\
+         \x20 3 1061 FB 1 0123 Rx - 9 00 01 02 03 04 05 06 07 08 09 0A 0B\n",
+        &[
+            (Some(1_059_900_000), Some("1"), rx, standard(0x300, &[0, 1])),
+            (Some(1_060_100_000), Some("2"), rx, frame(0, false, FrameKind::Error, &[4, 0, 2, 0])),
+            (Some(1_061_000_000), Some("1"), rx, twelve),
+        ],
+    );
+    let (_, frames, damage) =
+        read(b";$FILEVERSION=1.1\n     1)       1.0  Warng      FFFFFFFF  4  00 00 00 08  BUSHEAVY\n");
+    assert_eq!((frames.len(), damage.len()), (0, 1));
+    assert!(damage[0].starts_with("line 2: a report of the hardware, no frame of the bus"), "{damage:?}");
+}
+
+#[test]
+fn column_texts() {
+    expect(
+        "ASCII Trace IXXAT Automation GmbH  Version: 1.3\nDate: 24.11.2010\nBaudrate: 500 kbit/s\n\
+         \"Time\",\"Identifier (hex)\",\"Format\",\"Flags\",\"Data (hex)\"\n\
+         \"00:00:01.500\",\"181\",\"Std\",\"\",\"00 FF\"\n\
+         \"00:00:01.600\",\"18FEF1FE\",\"Ext\",\"\",\"\"\n\
+         \"00:00:01.700\",\"701\",\"Std\",\"rtr\",\"\"\n",
+        &[
+            (Some(1_500_000_000), None, None, standard(0x181, &[0, 0xFF])),
+            (Some(1_600_000_000), None, None, frame(0x18FE_F1FE, true, DATA, &[])),
+            (Some(1_700_000_000), None, None, remote(0x701, 0)),
+        ],
+    );
+    expect(
+        "CAN1  67F Tx SD  8  2F 03 10 00 FF 00 00 00\n",
+        &[(None, Some("CAN1"), Some(Direction::Tx), standard(0x67F, &[0x2F, 3, 0x10, 0, 0xFF, 0, 0, 0]))],
+    );
+}
+
+#[test]
+fn damaged_lines_are_reported_with_their_number() {
+    let long = "x".repeat(600_000);
+    let text = format!(
+        "can0  581   [8]  4B 41\n\ncan0  701   [1]  05\ncan0 18C#500\ncan0 FFF#\n(x) can0 123#\n{long}\n\
+         can0  701   [1]  05 7F\ncan0  1234   [0]\nhello\ncan0  701   [9]  00"
+    );
+    let (format, frames, damage) = read(text.as_bytes());
+    assert_eq!((format, frames.len()), (Format::Candump, 1));
+    assert_eq!(
+        damage,
+        [
+            "line 1: fewer bytes than the length in brackets says: \"can0  581   [8]  4B 41\"",
+            "line 4: up to 8 bytes in hex expected after #: \"can0 18C#500\"",
+            "line 5: an identifier of 3 or 8 hex digits expected: \"can0 FFF#\"",
+            "line 6: a time in brackets expected: \"(x) can0 123#\"",
+            "line 7: a line of more than 65,536 bytes",
+            "line 8: more bytes than the length in brackets says: \"can0  701   [1]  05 7F\"",
+            "line 9: an identifier of 3 or 8 hex digits expected: \"can0  1234   [0]\"",
+            "line 10: no frame: an identifier and a length in brackets expected: \"hello\"",
+            "line 11: a length of 0 to 8 expected in the brackets: \"can0  701   [9]  00\"",
+        ]
+    );
+}
+
+fn samples() -> Vec<Record> {
+    let at = |nanos, direction, frame| {
+        let mut record = Record::new(frame);
+        record.time = Some(Time(nanos));
+        record.direction = direction;
+        record
+    };
+    let rx = Some(Direction::Rx);
+    vec![
+        at(0, rx, standard(0, &[1, 0])),
+        at(1_682_489_978_627_243_000, rx, standard(0x581, &[0x4B, 0x41, 0x60, 0, 0x18, 2, 0x8F, 0xAF])),
+        at(1_682_489_978_627_243_001, Some(Direction::Tx), frame(0x1FFF_FFFF, true, DATA, &[0xFF; 8])),
+        at(1_682_489_979_000_000_000, rx, remote(0x701, 1)),
+        at(1_682_489_979_000_000_000, rx, frame(0x7FF, false, FD, &[0x5A; 64])),
+        at(1_682_489_980_000_000_000, rx, frame(4, false, FrameKind::Error, &[0, 4, 0, 0, 0, 0, 0, 0])),
+    ]
+}
+
+#[test]
+fn what_is_written_reads_back() {
+    for format in [WriteFormat::Candump, WriteFormat::Asc, WriteFormat::Trc, WriteFormat::PcapNg] {
+        let mut writer = Writer::new(Vec::new(), format);
+        for (at, record) in samples().iter().enumerate() {
+            writer.write(record, Some(if at % 2 == 0 { "can0" } else { "can1" })).unwrap();
+        }
+        let content = writer.finish().unwrap();
+        let (_, frames, damage) = read(&content);
+        assert_eq!(damage, Vec::<String>::new(), "{format:?}");
+        let keeps_direction = matches!(format, WriteFormat::Asc | WriteFormat::Trc);
+        for ((bus, read), written) in frames.iter().zip(&samples()) {
+            assert_eq!(read.time, written.time, "{format:?}");
+            // `.asc` knows of an error only that there was one.
+            if written.frame.kind == FrameKind::Error && format == WriteFormat::Asc {
+                assert_eq!(read.frame.kind, FrameKind::Error);
+                continue;
+            }
+            assert_eq!(read.frame, written.frame, "{format:?}");
+            assert!(!keeps_direction || read.direction == written.direction, "{format:?}");
+            assert!(bus.is_some());
+        }
+        assert_eq!(frames.len(), samples().len(), "{format:?}");
+    }
+}
+
+#[test]
+fn sent_frames_of_cooked_captures_are_told_from_their_copies() {
+    // pcap, nanoseconds, little-endian, link type 113.
+    let mut file = vec![0x4D, 0x3C, 0xB2, 0xA1, 2, 0, 4, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 4, 0, 113, 0, 0, 0];
+    let mut packet = |micros: u32, kind: u8, id: [u8; 4], byte: u8| {
+        file.extend(1_u32.to_le_bytes());
+        file.extend((micros * 1000).to_le_bytes());
+        file.extend(32_u32.to_le_bytes());
+        file.extend(32_u32.to_le_bytes());
+        file.extend([0, kind, 0x01, 0x18, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0x0C]);
+        file.extend(id);
+        file.extend([1, 0, 0, 0, byte, 0, 0, 0, 0, 0, 0, 0]);
+    };
+    let heartbeat = [1, 7, 0, 0];
+    packet(0, 4, heartbeat, 5); // the copy of the next but one
+    packet(1, 1, [2, 7, 0, 0], 5); // heard from elsewhere
+    packet(2, 1, heartbeat, 5);
+    packet(3, 1, [3, 7, 0, 0], 5); // heard first, its copy follows
+    packet(4, 4, [3, 7, 0, 0], 5);
+    packet(5, 4, [4, 7, 0, 0], 5); // sent, with no second copy
+    packet(6, 0, [5, 7, 0, 0], 5);
+    packet(7, 4, [0, 0, 7, 6], 5); // a big-endian identifier, which can be read one way only
+    let (_, frames, damage) = read(&file);
+    assert_eq!(damage, Vec::<String>::new());
+    let seen: Vec<_> = frames.iter().map(|(_, record)| (record.frame.id, record.loopback)).collect();
+    assert_eq!(
+        seen,
+        [
+            (0x701, true),
+            (0x702, false),
+            (0x701, false),
+            (0x703, false),
+            (0x703, true),
+            (0x704, false),
+            (0x705, false),
+            (0x706, false)
+        ]
+    );
+    file.truncate(file.len() - 20);
+    let (_, frames, damage) = read(&file);
+    assert_eq!(frames.len(), 7);
+    assert_eq!(damage, ["packet 8: the file ends inside a packet"]);
+}
+
+/// Every file of the recorded data: what comes in comes out, as a frame or as a report.
+#[test]
+fn recorded_files_lose_nothing() {
+    let recorded = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/recorded");
+    if !recorded.is_dir() {
+        println!("ignored: needs ../shared/recorded");
+        return;
+    }
+    let mut files: Vec<_> = ["can", "threads"]
+        .iter()
+        .flat_map(|folder| std::fs::read_dir(recorded.join(folder)).expect("a folder"))
+        .map(|entry| entry.expect("an entry").path())
+        .collect();
+    files.sort();
+    assert!(!files.is_empty());
+    for path in files {
+        let content = std::fs::read(&path).expect("a file");
+        let (format, frames, damage) = read(&content);
+        // Counted without the reader: lines that are neither blank nor comment, packet blocks.
+        let expected = if format == Format::Pcap {
+            packet_blocks(&content)
+        } else {
+            let text = String::from_utf8_lossy(&content);
+            text.lines()
+                .map(str::trim)
+                .filter(|line| !line.is_empty() && !line.starts_with(['#', ';']))
+                .count()
+        };
+        println!(
+            "{}: {expected} in, {} frames, {} reported",
+            path.file_name().unwrap_or_default().display(),
+            frames.len(),
+            damage.len()
+        );
+        assert_eq!(expected, frames.len() + damage.len(), "{}: {damage:?}", path.display());
+        assert!(damage.len() <= 1, "{damage:?}");
+    }
+}
+
+fn packet_blocks(mut file: &[u8]) -> usize {
+    let mut count = 0;
+    while let Some((head, _)) = file.split_first_chunk::<8>() {
+        let [a, b, c, d, rest @ ..] = *head;
+        count += usize::from([a, b, c, d] == [6, 0, 0, 0]);
+        file = &file[u32::from_le_bytes(rest) as usize..];
+    }
+    count
+}
