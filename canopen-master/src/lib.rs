@@ -2,11 +2,15 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
-#[cfg(test)]
+#[cfg(feature = "alloc")]
+extern crate alloc;
+#[cfg(any(test, feature = "std"))]
 extern crate std;
 
 pub mod ds401;
 pub mod ds402;
+#[cfg(feature = "eds")]
+pub mod eds;
 pub mod emcy;
 pub mod guarding;
 pub mod heartbeat;

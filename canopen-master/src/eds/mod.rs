@@ -1,0 +1,127 @@
+//! Device description files: EDS and DCF (CiA 306-1), XDD and XDC (CiA 311), concise DCF (CiA 302-3).
+//!
+//! [`read`] takes the bytes of a file, whatever its format and encoding, and gives a [`Device`]: the
+//! objects with data type, access, limits, default, configured value, and everything else the file
+//! says. Reading is lenient: what can be understood is, and every doubt is a [`Diagnostic`] with its
+//! line.
+//!
+//! Clauses are those of CiA 306-1 version 1.4, CiA 301 version 4.2 and CiA 311.
+
+mod diagnostic;
+mod encoding;
+pub mod ini;
+mod model;
+mod name;
+mod objects;
+mod reader;
+mod types;
+mod value;
+
+use alloc::borrow::Cow;
+use alloc::string::String;
+use alloc::vec::Vec;
+
+pub use diagnostic::{Diagnostic, Rule, Severity};
+pub use encoding::Encoding;
+pub use model::{Device, Entry, Fields, Module, Object, Section};
+pub use types::{Access, DataType, List, ObjectType, PdoMapping};
+pub use value::{Number, ValueError, fit, from_bytes, to_bytes};
+
+use reader::Findings;
+
+/// How a file is written.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Hash)]
+pub enum Format {
+    /// EDS or DCF: sections and entries (CiA 306-1).
+    Eds,
+    /// XDD or XDC: XML (CiA 311).
+    Xdd,
+}
+
+/// A file as it came.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Source {
+    /// How it is written.
+    pub format: Format,
+    /// What its bytes stand for.
+    pub encoding: Encoding,
+    /// Its text.
+    pub text: String,
+}
+
+/// What [`read`] made of a file.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Reading {
+    /// What the file says.
+    pub device: Device,
+    /// What was doubtful, by line.
+    pub diagnostics: Vec<Diagnostic>,
+    /// The file itself.
+    pub source: Source,
+}
+
+/// Why a file is refused.
+#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ReadError {
+    /// Nothing in it.
+    #[error("the file is empty")]
+    Empty,
+    /// Bytes that no text has.
+    #[error("not a text file: zero byte at offset {0}")]
+    Binary(usize),
+    /// Text, but without a single object.
+    #[error("no device description: no section of an object such as [1000] in {lines} lines")]
+    NoObjects {
+        /// Lines in the file.
+        lines: usize,
+    },
+}
+
+/// Reads an EDS, DCF, XDD or XDC file. Format and encoding are told from the content.
+///
+/// # Errors
+/// [`ReadError`] where the file is no device description at all.
+pub fn read(bytes: &[u8]) -> Result<Reading, ReadError> {
+    read_as(bytes, Encoding::detect(bytes))
+}
+
+/// Reads a file of which the encoding is known.
+///
+/// # Errors
+/// [`ReadError`] where the file is no device description at all.
+pub fn read_as(bytes: &[u8], encoding: Encoding) -> Result<Reading, ReadError> {
+    let text = encoding.decode(bytes);
+    if text.trim().is_empty() {
+        return Err(ReadError::Empty);
+    }
+    if let Some(offset) = bytes.iter().position(|byte| *byte == 0) {
+        return Err(ReadError::Binary(offset));
+    }
+    let mut findings = Findings::default();
+    if !matches!(encoding, Encoding::Ascii) {
+        let message = alloc::format!("characters beyond ASCII, read as {}", encoding.name());
+        findings.add(first_beyond_ascii(&text), Rule::Encoding, message);
+    }
+    let device = read_eds(&text, &mut findings)?;
+    let mut diagnostics = findings.0;
+    diagnostics.sort_by_key(|diagnostic| diagnostic.line);
+    let text = match text {
+        Cow::Borrowed(text) => text.into(),
+        Cow::Owned(text) => text,
+    };
+    Ok(Reading { device, diagnostics, source: Source { format: Format::Eds, encoding, text } })
+}
+
+fn read_eds(text: &str, findings: &mut Findings) -> Result<Device, ReadError> {
+    let device = reader::read(&ini::Document::parse(text), findings);
+    if device.objects.is_empty() {
+        return Err(ReadError::NoObjects { lines: text.lines().count() });
+    }
+    Ok(device)
+}
+
+fn first_beyond_ascii(text: &str) -> u32 {
+    let before = text.bytes().take_while(u8::is_ascii).filter(|byte| *byte == b'\n').count();
+    u32::try_from(before).unwrap_or(u32::MAX).saturating_add(1)
+}

@@ -1,0 +1,336 @@
+//! Sections of objects to [`Object`]s (CiA 306-1, 6.6.3).
+
+use alloc::borrow::ToOwned;
+use alloc::collections::BTreeMap;
+use alloc::format;
+use alloc::string::String;
+use alloc::vec::Vec;
+
+use super::diagnostic::Rule;
+use super::ini::Section as Lines;
+use super::model::{Entry, Fields, Object, Section};
+use super::name::Part;
+use super::reader::{Findings, duplicate, indices, repeated, shorten};
+use super::types::{Access, DataType, ObjectType, PdoMapping};
+use super::value::Number;
+
+/// Collects the sections of objects, which come in any order.
+#[derive(Default)]
+pub(crate) struct Builder<'a> {
+    objects: BTreeMap<u16, Object>,
+    /// Line of the object's own section and its `SubNumber`.
+    declared: BTreeMap<u16, (u32, Option<i128>)>,
+    pending: Vec<(u16, Part, &'a Lines<'a>)>,
+}
+
+impl<'a> Builder<'a> {
+    pub(crate) fn add(&mut self, index: u16, part: Part, section: &'a Lines<'a>, findings: &mut Findings) {
+        if part != Part::Own {
+            self.pending.push((index, part, section));
+            return;
+        }
+        if let Some((first, _)) = self.declared.get(&index) {
+            repeated(section, *first, findings);
+        }
+        let object = self.objects.entry(index).or_insert_with(|| Object::new(index));
+        let counts = read_entry(&mut object.own, section, true, findings);
+        object.compact = counts.compact.or(object.compact);
+        self.declared.insert(index, (section.line, counts.sub_number));
+    }
+
+    /// The objects, and entries of lists that belong to no sub-object.
+    pub(crate) fn finish(mut self, findings: &mut Findings) -> (Vec<Object>, Vec<Section>) {
+        let pending = core::mem::take(&mut self.pending);
+        for (index, part, section) in &pending {
+            if let Part::Sub(subindex) = *part {
+                self.add_sub(*index, subindex, section, findings);
+            }
+        }
+        self.check_counts(findings);
+        for object in self.objects.values_mut() {
+            let Some(count) = object.compact.filter(|count| *count > 0) else { continue };
+            for subindex in 0..=count {
+                if object.subs.binary_search_by_key(&subindex, |entry| entry.subindex).is_err() {
+                    object.insert(object.compact_entry(subindex));
+                }
+            }
+        }
+        let mut leftover = Vec::new();
+        for (index, part, section) in pending {
+            let rest = match part {
+                Part::Names | Part::Values | Part::Denotations => {
+                    self.add_list(index, part, section, findings)
+                }
+                Part::Links => self.add_links(index, section, findings),
+                Part::Own | Part::Sub(_) => continue,
+            };
+            if !rest.is_empty() {
+                leftover.push(Section { name: section.name.to_owned(), fields: rest });
+            }
+        }
+        (self.objects.into_values().collect(), leftover)
+    }
+
+    fn add_sub(&mut self, index: u16, subindex: u8, section: &Lines<'_>, findings: &mut Findings) {
+        let object = self.objects.entry(index).or_insert_with(|| {
+            let message = format!("there is no section [{index:04X}]; read as a RECORD without a name");
+            findings.add(section.line, Rule::Orphan, message);
+            let mut object = Object::new(index);
+            object.own.object_type = ObjectType::RECORD;
+            object
+        });
+        // Sub-objects mostly come in ascending order.
+        let at = match object.subs.last() {
+            Some(last) if last.subindex >= subindex => {
+                object.subs.binary_search_by_key(&subindex, |entry| entry.subindex)
+            }
+            _ => Err(object.subs.len()),
+        };
+        let at = match at {
+            Ok(at) => {
+                repeated(section, 0, findings);
+                at
+            }
+            Err(at) => {
+                object.subs.insert(at, Entry::new(subindex));
+                at
+            }
+        };
+        if let Some(entry) = object.subs.get_mut(at) {
+            read_entry(entry, section, false, findings);
+        }
+    }
+
+    fn check_counts(&self, findings: &mut Findings) {
+        for (index, (line, sub_number)) in &self.declared {
+            let Some(object) = self.objects.get(index) else { continue };
+            let described = object.subs.len();
+            match *sub_number {
+                Some(number)
+                    if i128::try_from(described) != Ok(number) && object.compact.unwrap_or(0) == 0 =>
+                {
+                    let message = format!("SubNumber says {number}, sub-objects described: {described}");
+                    findings.add(*line, Rule::SubNumber, message);
+                }
+                None if described > 0 && object.compact.unwrap_or(0) == 0 => {
+                    findings.add(
+                        *line,
+                        Rule::SubNumber,
+                        format!("SubNumber is missing, sub-objects described: {described}"),
+                    );
+                }
+                _ => {}
+            }
+        }
+    }
+
+    /// `[xxxxName]`, `[xxxxValue]`, `[xxxxDenotation]`: gives back what belongs to no sub-object.
+    fn add_list(&mut self, index: u16, part: Part, section: &Lines<'_>, findings: &mut Findings) -> Fields {
+        let mut rest = Fields::default();
+        let mut object = self.objects.get_mut(&index);
+        if object.is_none() {
+            findings.add(section.line, Rule::Orphan, format!("there is no section [{index:04X}]"));
+        }
+        let mut declared = None;
+        let mut count = 0;
+        for (line, key, value) in section.entries() {
+            if key.eq_ignore_ascii_case("NrOfEntries") {
+                declared = Some((line, Number::parse(value)));
+                continue;
+            }
+            count += 1;
+            let subindex = key.parse().ok();
+            let Some(entry) = subindex.and_then(|subindex| object.as_deref_mut()?.entry_mut(subindex)) else {
+                if object.is_some() {
+                    findings.add(
+                        line,
+                        Rule::Compact,
+                        format!("{index:04X}h has no sub-index {}", shorten(key)),
+                    );
+                }
+                rest.set(key, value);
+                continue;
+            };
+            match part {
+                Part::Names => value.clone_into(&mut entry.name),
+                Part::Values => entry.value = Some(value.to_owned()),
+                _ => entry.denotation = Some(value.to_owned()),
+            }
+        }
+        let (line, number) = declared.unwrap_or((section.line, None));
+        if number.map(|number| number.value) != Some(count) {
+            let declared =
+                number.map_or_else(|| "is missing".into(), |number| format!("says {}", number.value));
+            let message = format!("NrOfEntries of [{}] {declared}, entries: {count}", section.name);
+            findings.add(line, Rule::Compact, message);
+        }
+        rest
+    }
+
+    fn add_links(&mut self, index: u16, section: &Lines<'_>, findings: &mut Findings) -> Fields {
+        let Some(object) = self.objects.get_mut(&index) else {
+            findings.add(section.line, Rule::Orphan, format!("there is no section [{index:04X}]"));
+            return section.entries().map(|(_, key, value)| (key, value)).collect();
+        };
+        let links = indices(section, "ObjectLinks", Rule::Links, findings);
+        object.links.extend(links.into_iter().map(|(_, index)| index));
+        Fields::default()
+    }
+}
+
+/// Entries of an object's own section that count something.
+#[derive(Default)]
+struct Counts {
+    sub_number: Option<i128>,
+    compact: Option<u8>,
+}
+
+/// The keys that have a field of their own, in the order in which they are written.
+pub(crate) const KEYS: [&str; 14] = [
+    "ParameterName",
+    "ObjectType",
+    "DataType",
+    "AccessType",
+    "DefaultValue",
+    "PDOMapping",
+    "LowLimit",
+    "HighLimit",
+    "ParameterValue",
+    "ParameterRefName",
+    "Denotation",
+    "ObjFlags",
+    "SubNumber",
+    "CompactSubObj",
+];
+
+/// Position of the key in [`KEYS`].
+fn key_position(key: &str) -> Option<usize> {
+    KEYS.iter().position(|known| known.len() == key.len() && known.eq_ignore_ascii_case(key))
+}
+
+fn read_entry(entry: &mut Entry, section: &Lines<'_>, own: bool, findings: &mut Findings) -> Counts {
+    let mut counts = Counts::default();
+    let mut seen = 0_u16;
+    for (line, key, value) in section.entries() {
+        let Some(position) = key_position(key).filter(|position| own || *position < 12) else {
+            if entry.other.set(key, value) {
+                duplicate(line, key, findings);
+            }
+            continue;
+        };
+        let bit = 1 << position;
+        if seen & bit != 0 {
+            duplicate(line, key, findings);
+        }
+        seen |= bit;
+        let text = || Some(value.to_owned());
+        let read = match position {
+            0 => {
+                value.clone_into(&mut entry.name);
+                true
+            }
+            1 => number(line, key, value, findings)
+                .map(|number| entry.object_type = ObjectType(number))
+                .is_some(),
+            2 => number(line, key, value, findings)
+                .map(|number| entry.data_type = Some(DataType(number)))
+                .is_some(),
+            3 => access(line, value, findings).map(|access| entry.access = Some(access)).is_some(),
+            4 => assign(&mut entry.default, text()),
+            5 => {
+                mapping(line, key, value, findings).map(|mapping| entry.pdo_mapping = Some(mapping)).is_some()
+            }
+            6 => assign(&mut entry.low_limit, text()),
+            7 => assign(&mut entry.high_limit, text()),
+            8 => assign(&mut entry.value, text()),
+            9 => assign(&mut entry.ref_name, text()),
+            10 => assign(&mut entry.denotation, text()),
+            11 => number(line, key, value, findings).map(|number| entry.flags = Some(number)).is_some(),
+            12 => number::<u8>(line, key, value, findings)
+                .map(|number| counts.sub_number = Some(number.into()))
+                .is_some(),
+            _ => number(line, key, value, findings).map(|number| counts.compact = Some(number)).is_some(),
+        };
+        if !read {
+            entry.other.set(key, value);
+        }
+    }
+    missing(entry, section, seen, own, findings);
+    counts
+}
+
+/// What the kind of object needs (CiA 306-1, table 7).
+fn missing(entry: &Entry, section: &Lines<'_>, seen: u16, own: bool, findings: &mut Findings) {
+    let compact = own && seen & 1 << 13 != 0;
+    let needs_value = matches!(entry.object_type, ObjectType::VAR) || compact;
+    let needs = [(0, true), (2, needs_value), (3, needs_value)];
+    for (position, needed) in needs {
+        if needed && seen & 1 << position == 0 {
+            let key = KEYS.get(position).copied().unwrap_or_default();
+            findings.add(section.line, Rule::MissingEntry, format!("[{}] has no {key}", section.name));
+        }
+    }
+}
+
+fn assign(field: &mut Option<String>, text: Option<String>) -> bool {
+    *field = text;
+    true
+}
+
+fn number<T: TryFrom<i128>>(line: u32, key: &str, value: &str, findings: &mut Findings) -> Option<T> {
+    let number = Number::parse(value).filter(|number| !number.node_id);
+    let Some((number, fits)) = number.map(|number| (number, T::try_from(number.value).ok())) else {
+        findings.add(line, Rule::Value, format!("{key} is no number: \"{}\"", shorten(value)));
+        return None;
+    };
+    if fits.is_none() {
+        findings.add(line, Rule::Value, format!("{key} is out of range: {}", number.value));
+    } else if !number.clean {
+        spelling(line, key, value, &format!("{}", number.value), findings);
+    }
+    fits
+}
+
+fn spelling(line: u32, key: &str, value: &str, taken: &str, findings: &mut Findings) {
+    findings.add(line, Rule::Spelling, format!("{key}=\"{}\" is taken as {taken}", shorten(value)));
+}
+
+fn access(line: u32, value: &str, findings: &mut Findings) -> Option<Access> {
+    if let Some(access) = Access::parse(value) {
+        return Some(access);
+    }
+    let word: String = value
+        .split([';', '#'])
+        .next()
+        .unwrap_or_default()
+        .chars()
+        .filter(char::is_ascii_alphanumeric)
+        .collect();
+    let access = Access::parse(&word).or_else(|| match word.to_ascii_lowercase().as_str() {
+        "r" | "read" | "readonly" => Some(Access::ReadOnly),
+        "w" | "write" | "writeonly" => Some(Access::WriteOnly),
+        "readwrite" => Some(Access::ReadWrite),
+        _ => None,
+    });
+    match access {
+        Some(access) => spelling(line, "AccessType", value, access.word(), findings),
+        None => {
+            let message =
+                format!("AccessType is none of ro, wo, rw, rwr, rww, const: \"{}\"", shorten(value));
+            findings.add(line, Rule::Value, message);
+        }
+    }
+    access
+}
+
+fn mapping(line: u32, key: &str, value: &str, findings: &mut Findings) -> Option<PdoMapping> {
+    match number::<u8>(line, key, value, findings)? {
+        0 => Some(PdoMapping::No),
+        number => {
+            if number > 1 {
+                spelling(line, key, value, "1", findings);
+            }
+            Some(PdoMapping::Optional)
+        }
+    }
+}
