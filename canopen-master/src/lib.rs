@@ -7,6 +7,7 @@ extern crate alloc;
 #[cfg(any(test, feature = "std"))]
 extern crate std;
 
+pub mod data_type;
 pub mod ds401;
 pub mod ds402;
 #[cfg(feature = "eds")]
@@ -17,5 +18,8 @@ pub mod heartbeat;
 pub mod lss;
 pub mod nmt;
 mod ring;
+pub mod sdo;
 pub mod sync;
 pub mod time;
+
+pub use pdo::{Address, Frame, Handled, NodeId};

@@ -5,11 +5,13 @@
 #[cfg(test)]
 extern crate std;
 
+mod address;
 pub mod cob;
 mod frame;
 mod handled;
 mod node;
 
+pub use address::Address;
 pub use cob::{CobId, Service};
 pub use frame::Frame;
 pub use handled::Handled;

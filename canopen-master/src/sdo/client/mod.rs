@@ -1,0 +1,362 @@
+//! The client: one transfer at a time on one channel, each with exactly one outcome.
+
+mod outcome;
+mod segmented;
+
+use core::time::Duration;
+
+use pdo::{Frame, Handled};
+
+use super::message::{ABORT, Request, Response};
+use super::{AbortCode, Address, Buffer, Channel, data_on};
+pub use outcome::{Fault, Finished, Outcome, Refused, SubmitError, Ticket};
+
+/// Time that a server has for each answer, unless set (CiA 301 names none).
+pub const ANSWER: Duration = Duration::from_millis(500);
+
+/// How one transfer is carried out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Options {
+    /// Longest time from a request to its answer; not the time of the whole transfer.
+    pub timeout: Duration,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { timeout: ANSWER }
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum State {
+    Idle,
+    /// The request to begin was given; its answer is awaited.
+    UploadBegun,
+    /// A segment is awaited.
+    UploadSegment {
+        toggle: bool,
+    },
+    /// As `UploadBegun`. `sent` bytes went with it.
+    DownloadBegun {
+        sent: u8,
+    },
+    /// A segment of `sent` bytes is to be confirmed.
+    DownloadSegment {
+        toggle: bool,
+        sent: u8,
+        last: bool,
+    },
+    /// The outcome waits to be polled.
+    Ended(Outcome),
+}
+
+/// The answer to a request that was given up, which may still come.
+#[derive(Debug, Clone, Copy)]
+struct Outstanding {
+    upload: bool,
+    at: Address,
+    until: Duration,
+}
+
+/// An SDO client on one channel.
+///
+/// - Commands: [`upload`](Self::upload), [`download`](Self::download), [`cancel`](Self::cancel).
+/// - Input: [`handle_frame`](Self::handle_frame), [`handle_timeout`](Self::handle_timeout).
+/// - Output: [`poll_transmit`](Self::poll_transmit), [`poll_event`](Self::poll_event),
+///   [`poll_timeout`](Self::poll_timeout).
+/// - Getters: [`channel`](Self::channel), [`is_idle`](Self::is_idle), [`strays`](Self::strays),
+///   [`progress`](Self::progress).
+///
+/// Nothing is ever repeated. A transfer that is given up is told to the server by an abort.
+///
+/// Late answers: while a transfer begins, every frame that does not answer it (another object, another
+/// service) is counted and otherwise ignored, so no answer of an earlier transfer enters the next one.
+/// An answer carries nothing to tell two like requests apart; therefore after a time-out or a cancel
+/// before the first answer, the *same* request to the *same* object is held back until the old answer
+/// has come, or for one more time-out.
+#[derive(Debug, Clone)]
+pub struct Client<B> {
+    channel: Channel,
+    state: State,
+    buffer: Option<B>,
+    at: Address,
+    timeout: Duration,
+    deadline: Option<Duration>,
+    /// Bytes transferred.
+    offset: u32,
+    /// Bytes in all, if known.
+    size: Option<u32>,
+    tx: Option<[u8; 8]>,
+    abort: Option<[u8; 8]>,
+    outstanding: Option<Outstanding>,
+    ticket: u32,
+    strays: u32,
+}
+
+impl<B: Buffer> Client<B> {
+    /// An idle client.
+    #[must_use]
+    pub const fn new(channel: Channel) -> Self {
+        Self {
+            channel,
+            state: State::Idle,
+            buffer: None,
+            at: Address::new(0, 0),
+            timeout: ANSWER,
+            deadline: None,
+            offset: 0,
+            size: None,
+            tx: None,
+            abort: None,
+            outstanding: None,
+            ticket: 0,
+            strays: 0,
+        }
+    }
+
+    /// Its identifiers.
+    #[must_use]
+    pub const fn channel(&self) -> Channel {
+        self.channel
+    }
+
+    /// Whether a transfer can be submitted.
+    #[must_use]
+    pub const fn is_idle(&self) -> bool {
+        matches!(self.state, State::Idle)
+    }
+
+    /// Frames on the channel that answered nothing asked.
+    #[must_use]
+    pub const fn strays(&self) -> u32 {
+        self.strays
+    }
+
+    /// Bytes transferred so far and, if known, in all, of the transfer under way.
+    #[must_use]
+    pub const fn progress(&self) -> (u32, Option<u32>) {
+        (self.offset, self.size)
+    }
+
+    /// Reads an object into `buffer`.
+    ///
+    /// # Errors
+    /// [`SubmitError::Busy`] until the last outcome has been polled.
+    #[inline]
+    pub fn upload(&mut self, at: Address, buffer: B, options: &Options) -> Result<Ticket, Refused<B>> {
+        if !self.is_idle() {
+            return Err(Refused { error: SubmitError::Busy, buffer });
+        }
+        self.size = None;
+        self.tx = Some(Request::InitiateUpload { at }.encode());
+        self.state = State::UploadBegun;
+        Ok(self.begin(at, buffer, options))
+    }
+
+    /// Writes what `buffer` holds to an object.
+    ///
+    /// # Errors
+    /// [`SubmitError::Busy`] until the last outcome has been polled, [`SubmitError::Source`] if the
+    /// buffer cannot be read.
+    #[inline]
+    pub fn download(&mut self, at: Address, mut buffer: B, options: &Options) -> Result<Ticket, Refused<B>> {
+        if !self.is_idle() {
+            return Err(Refused { error: SubmitError::Busy, buffer });
+        }
+        self.size = buffer.size();
+        let begun = segmented::begin_download(at, &mut buffer, self.size);
+        let (tx, sent) = match begun {
+            Ok(begun) => begun,
+            Err(code) => return Err(Refused { error: SubmitError::Source(code), buffer }),
+        };
+        self.tx = Some(tx);
+        self.state = State::DownloadBegun { sent };
+        Ok(self.begin(at, buffer, options))
+    }
+
+    #[inline]
+    fn begin(&mut self, at: Address, buffer: B, options: &Options) -> Ticket {
+        self.at = at;
+        self.buffer = Some(buffer);
+        self.timeout = options.timeout;
+        self.deadline = None;
+        self.offset = 0;
+        self.ticket = self.ticket.wrapping_add(1);
+        Ticket(self.ticket)
+    }
+
+    /// Gives a transfer up; its outcome becomes [`Outcome::Cancelled`] unless it has one already.
+    pub fn cancel(&mut self, ticket: Ticket) {
+        if ticket != Ticket(self.ticket) || matches!(self.state, State::Idle | State::Ended(_)) {
+            return;
+        }
+        // Before the first frame has left, the server knows of nothing.
+        let begun = self.tx.is_none() || !self.is_beginning();
+        self.expect_late(self.deadline);
+        self.finish(Outcome::Cancelled);
+        if begun {
+            self.send_abort(AbortCode::TIMED_OUT);
+        }
+    }
+
+    /// Takes a frame from the bus.
+    #[inline]
+    pub fn handle_frame(&mut self, now: Duration, frame: &impl embedded_can::Frame) -> Handled {
+        let Some(data) = data_on(self.channel.response, frame) else { return Handled::Ignored };
+        self.handle_data(now, data);
+        Handled::Taken
+    }
+
+    /// Gives up what has waited too long; early calls do nothing.
+    pub fn handle_timeout(&mut self, now: Duration) {
+        if self.outstanding.is_some_and(|outstanding| now >= outstanding.until) {
+            self.outstanding = None;
+        }
+        let Some(deadline) = self.deadline.filter(|&deadline| now >= deadline) else { return };
+        self.expect_late(Some(deadline.saturating_add(self.timeout)));
+        self.finish(Outcome::TimedOut);
+        self.send_abort(AbortCode::TIMED_OUT);
+    }
+
+    /// When to call [`handle_timeout`](Self::handle_timeout); `None` = idle.
+    #[must_use]
+    #[inline]
+    pub fn poll_timeout(&self) -> Option<Duration> {
+        if self.tx.is_some() {
+            return self.held_back_until();
+        }
+        self.deadline
+    }
+
+    /// The frame to send now, once.
+    #[inline]
+    pub fn poll_transmit(&mut self, now: Duration) -> Option<Frame> {
+        if let Some(abort) = self.abort.take() {
+            return Some(Frame::standard(self.channel.request, abort));
+        }
+        let tx = self.tx?;
+        if self.held_back_until().is_some_and(|until| now < until) {
+            return None;
+        }
+        self.tx = None;
+        self.deadline = Some(now.saturating_add(self.timeout));
+        Some(Frame::standard(self.channel.request, tx))
+    }
+
+    /// The outcome of the transfer and its buffer, once.
+    #[inline]
+    pub fn poll_event(&mut self) -> Option<Finished<B>> {
+        let State::Ended(outcome) = self.state else { return None };
+        self.state = State::Idle;
+        let buffer = self.buffer.take()?;
+        Some(Finished { ticket: Ticket(self.ticket), at: self.at, outcome, buffer })
+    }
+
+    #[inline]
+    fn handle_data(&mut self, _now: Duration, data: &[u8]) {
+        // With our next request still to be sent, nothing but an abort of what was begun makes sense.
+        let asked = self.tx.is_none() || (!self.is_beginning() && data.first() == Some(&ABORT));
+        if !asked || matches!(self.state, State::Idle | State::Ended(_)) {
+            return self.stray(data);
+        }
+        let response = match Response::parse(data) {
+            Ok(response) => response,
+            // Nothing says that damage belongs to this transfer while it begins.
+            Err(_) if self.is_beginning() => return self.stray(data),
+            Err(error) => return self.give_up(Fault::Message(error)),
+        };
+        match (response, self.state) {
+            (Response::Abort { at, code }, _) => self.on_abort(at, code, data),
+            (Response::InitiateUpload { at, content }, State::UploadBegun) if at == self.at => {
+                self.on_upload_begun(content);
+            }
+            (Response::InitiateDownload { at }, State::DownloadBegun { sent }) if at == self.at => {
+                self.on_download_begun(sent);
+            }
+            (Response::UploadSegment { toggle, last, data }, State::UploadSegment { toggle: expected }) => {
+                self.on_upload_segment(expected, toggle, last, data.as_slice());
+            }
+            (
+                Response::DownloadSegment { toggle },
+                State::DownloadSegment { toggle: expected, sent, last },
+            ) => {
+                self.on_download_segment(expected, toggle, sent, last);
+            }
+            _ if self.is_beginning() => self.stray(data),
+            _ => self.give_up(Fault::Unexpected { command: data.first().copied().unwrap_or(0) }),
+        }
+    }
+
+    /// An abort of another object is late while ours begins; later on, devices that abort without
+    /// naming the object (0000h:00) are understood.
+    fn on_abort(&mut self, at: Address, code: AbortCode, data: &[u8]) {
+        let unnamed = at == Address::new(0, 0) && !self.is_beginning();
+        if at == self.at || unnamed {
+            self.finish(Outcome::Aborted(code));
+        } else {
+            self.stray(data);
+        }
+    }
+
+    const fn is_beginning(&self) -> bool {
+        matches!(self.state, State::UploadBegun | State::DownloadBegun { .. })
+    }
+
+    /// Whether the request that is ready to go waits for an old answer.
+    #[inline]
+    fn held_back_until(&self) -> Option<Duration> {
+        let outstanding = self.outstanding?;
+        let upload = match self.state {
+            State::UploadBegun => true,
+            State::DownloadBegun { .. } => false,
+            _ => return None,
+        };
+        (outstanding.upload == upload && outstanding.at == self.at).then_some(outstanding.until)
+    }
+
+    /// A first answer may come too late from now on.
+    fn expect_late(&mut self, until: Option<Duration>) {
+        if let Some(until) = until.filter(|_| self.is_beginning() && self.tx.is_none()) {
+            let upload = matches!(self.state, State::UploadBegun);
+            self.outstanding = Some(Outstanding { upload, at: self.at, until });
+        }
+    }
+
+    #[cold]
+    fn stray(&mut self, data: &[u8]) {
+        self.strays = self.strays.saturating_add(1);
+        let Some(outstanding) = self.outstanding else { return };
+        let answers = match Response::parse(data) {
+            Ok(Response::InitiateUpload { at, .. }) => outstanding.upload && at == outstanding.at,
+            Ok(Response::InitiateDownload { at }) => !outstanding.upload && at == outstanding.at,
+            Ok(Response::Abort { at, .. }) => at == outstanding.at,
+            _ => false,
+        };
+        if answers {
+            self.outstanding = None;
+        }
+    }
+
+    #[inline]
+    fn send(&mut self, request: Request) {
+        self.tx = Some(request.encode());
+        self.deadline = None;
+    }
+
+    #[inline]
+    fn finish(&mut self, outcome: Outcome) {
+        self.tx = None;
+        self.deadline = None;
+        self.state = State::Ended(outcome);
+    }
+
+    fn send_abort(&mut self, code: AbortCode) {
+        self.abort = Some(Request::Abort { at: self.at, code }.encode());
+    }
+
+    #[cold]
+    fn give_up(&mut self, fault: Fault) {
+        self.finish(Outcome::GaveUp(fault));
+        self.send_abort(fault.abort_code());
+    }
+}

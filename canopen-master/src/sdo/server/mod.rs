@@ -1,0 +1,203 @@
+//! The server: answers one client on one channel from an [`Access`].
+
+mod access;
+mod segmented;
+
+use core::time::Duration;
+
+use pdo::{Frame, Handled};
+
+use super::message::{Request, Response};
+use super::{AbortCode, Address, Channel, data_on};
+pub use access::{Access, Piece, Total, read_slice};
+
+/// Time that a client has for each next request, unless set (CiA 301 names none).
+pub const NEXT_REQUEST: Duration = Duration::from_secs(1);
+
+/// Bytes held between frames: what must not be torn (8), and the end of a block download whose
+/// length is only known at last (14).
+const HELD: usize = 14;
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum State {
+    Idle,
+    /// A request for the next segment is awaited.
+    Upload {
+        toggle: bool,
+    },
+    /// The next segment is awaited.
+    Download {
+        toggle: bool,
+    },
+}
+
+/// An SDO server on one channel.
+///
+/// - Input: [`handle_frame`](Self::handle_frame), [`handle_timeout`](Self::handle_timeout),
+///   [`reset`](Self::reset).
+/// - Output: [`poll_transmit`](Self::poll_transmit), [`poll_timeout`](Self::poll_timeout).
+/// - Getters: [`channel`](Self::channel), [`is_idle`](Self::is_idle).
+///
+/// Every method that may touch objects is given them by the caller. A new request to begin replaces the
+/// transfer under way: its client has given it up, even if its abort was lost. An answer that was not
+/// polled before the next request is replaced.
+#[derive(Debug, Clone)]
+pub struct Server {
+    channel: Channel,
+    timeout: Duration,
+    state: State,
+    at: Address,
+    deadline: Option<Duration>,
+    /// Bytes transferred; of a download, bytes given to the objects.
+    offset: u32,
+    size: Option<u32>,
+    held: [u8; HELD],
+    held_len: u8,
+    tx: Option<[u8; 8]>,
+}
+
+impl Server {
+    /// An idle server that gives a transfer up when the client is silent for `timeout`.
+    #[must_use]
+    pub const fn new(channel: Channel, timeout: Duration) -> Self {
+        Self {
+            channel,
+            timeout,
+            state: State::Idle,
+            at: Address::new(0, 0),
+            deadline: None,
+            offset: 0,
+            size: None,
+            held: [0; HELD],
+            held_len: 0,
+            tx: None,
+        }
+    }
+
+    /// Its identifiers.
+    #[must_use]
+    pub const fn channel(&self) -> Channel {
+        self.channel
+    }
+
+    /// Whether no transfer is under way.
+    #[must_use]
+    pub const fn is_idle(&self) -> bool {
+        matches!(self.state, State::Idle)
+    }
+
+    /// Ends the transfer under way without a word, as a change of the NMT state does, and takes over
+    /// other identifiers.
+    pub fn reset(&mut self, channel: Channel, objects: &mut impl Access) {
+        self.replace(objects);
+        self.tx = None;
+        self.channel = channel;
+    }
+
+    /// Takes a frame from the bus.
+    #[inline]
+    pub fn handle_frame(
+        &mut self,
+        now: Duration,
+        frame: &impl embedded_can::Frame,
+        objects: &mut impl Access,
+    ) -> Handled {
+        let Some(data) = data_on(self.channel.request, frame) else { return Handled::Ignored };
+        self.handle_data(now, data, objects);
+        Handled::Taken
+    }
+
+    /// Gives up a transfer whose client is silent; early calls do nothing.
+    pub fn handle_timeout(&mut self, now: Duration, objects: &mut impl Access) {
+        if self.deadline.is_some_and(|deadline| now >= deadline) {
+            self.abort(AbortCode::TIMED_OUT, objects);
+        }
+    }
+
+    /// When to call [`handle_timeout`](Self::handle_timeout); `None` = idle.
+    #[must_use]
+    #[inline]
+    pub const fn poll_timeout(&self) -> Option<Duration> {
+        self.deadline
+    }
+
+    /// The frame to send now, once.
+    #[inline]
+    pub fn poll_transmit(&mut self, _now: Duration, objects: &mut impl Access) -> Option<Frame> {
+        let _ = objects;
+        self.tx.take().map(|tx| Frame::standard(self.channel.response, tx))
+    }
+
+    #[inline]
+    fn handle_data(&mut self, now: Duration, data: &[u8], objects: &mut impl Access) {
+        let request = match Request::parse(data) {
+            Ok(request) => request,
+            Err(_) => {
+                self.name_nothing_if_idle();
+                return self.abort(AbortCode::COMMAND, objects);
+            }
+        };
+        let done = match (request, self.state) {
+            (Request::InitiateUpload { at }, _) => {
+                self.begin(at, objects);
+                self.begin_upload(objects)
+            }
+            (Request::InitiateDownload { at, content }, _) => {
+                self.begin(at, objects);
+                self.begin_download(content, objects)
+            }
+            (Request::UploadSegment { toggle }, State::Upload { toggle: expected }) => {
+                self.upload_segment(expected, toggle, objects)
+            }
+            (Request::DownloadSegment { toggle, last, data }, State::Download { toggle: expected }) => {
+                self.download_segment(expected, toggle, last, data.as_slice(), objects)
+            }
+            (Request::Abort { .. }, _) => return self.replace(objects),
+            _ => {
+                self.name_nothing_if_idle();
+                Err(AbortCode::COMMAND)
+            }
+        };
+        match done {
+            Ok(response) => {
+                self.tx = Some(response.encode());
+                self.deadline = (!self.is_idle()).then(|| now.saturating_add(self.timeout));
+            }
+            Err(code) => self.abort(code, objects),
+        }
+    }
+
+    #[inline]
+    fn begin(&mut self, at: Address, objects: &mut impl Access) {
+        if !self.is_idle() {
+            self.replace(objects);
+        }
+        self.at = at;
+        self.offset = 0;
+        self.size = None;
+        self.held_len = 0;
+    }
+
+    /// Leaves the transfer under way.
+    fn replace(&mut self, objects: &mut impl Access) {
+        if matches!(self.state, State::Download { .. }) {
+            objects.abandon(self.at);
+        }
+        self.state = State::Idle;
+        self.deadline = None;
+    }
+
+    /// A frame out of place may be a repeated one of a transfer that is over: an abort that named its
+    /// object could hit the next transfer.
+    fn name_nothing_if_idle(&mut self) {
+        if self.is_idle() {
+            self.at = Address::new(0, 0);
+        }
+    }
+
+    #[cold]
+    fn abort(&mut self, code: AbortCode, objects: &mut impl Access) {
+        self.replace(objects);
+        self.tx = Some(Response::Abort { at: self.at, code }.encode());
+    }
+}
