@@ -7,6 +7,7 @@ extern crate alloc;
 #[cfg(test)]
 extern crate std;
 
+pub mod application;
 mod controller;
 pub mod failure;
 pub mod input;
