@@ -127,7 +127,7 @@ enum Notice {
 /// Notices held until polled; more are counted in [`Master::lost_notices`].
 const NOTICES: usize = 3;
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy)]
 enum State {
     Idle,
     /// The request lies in `buffer`, to be polled.
@@ -245,7 +245,7 @@ impl Master {
     /// [`SubmitError::NotRepeatable`] for `retries` above 0 of a request that changes the device,
     /// [`SubmitError::Encode`] for one that no telegram can carry.
     pub fn submit(&mut self, request: &Request<'_>, retries: u8) -> Result<Ticket, SubmitError> {
-        if self.state != State::Idle {
+        if !matches!(self.state, State::Idle) {
             return Err(SubmitError::Busy);
         }
         if retries > 0 && !request.is_repeatable() {
@@ -274,7 +274,7 @@ impl Master {
     /// The bytes to send now, once. The caller says when the last of them has left the line with
     /// [`handle_transmit_done`](Self::handle_transmit_done).
     pub fn poll_transmit(&mut self, _now: Duration) -> Option<&[u8]> {
-        if self.state != State::ToSend {
+        if !matches!(self.state, State::ToSend) {
             return None;
         }
         self.state = State::Sending;
@@ -284,7 +284,7 @@ impl Master {
 
     /// The last byte of the request has left: the time for an answer starts.
     pub fn handle_transmit_done(&mut self, now: Duration) {
-        if self.state == State::Sending {
+        if matches!(self.state, State::Sending) {
             self.state = State::Waiting(now.saturating_add(self.config.answer));
         }
     }
@@ -325,8 +325,8 @@ impl Master {
     /// What happened, until `None`. An answer's data are borrowed from the engine: the next request
     /// can be submitted when they have been used.
     pub fn poll_event(&mut self) -> Option<Event<'_>> {
-        if let Some(notice) = self.notices.first_mut().and_then(Option::take) {
-            self.notices.rotate_left(1);
+        if let [Some(notice), second, third] = self.notices {
+            self.notices = [second, third, None];
             return Some(match notice {
                 Notice::Damage(damage) => Event::Damage(damage),
                 Notice::SecondAnswer(ticket) => Event::SecondAnswer(ticket),

@@ -4,7 +4,7 @@ use core::fmt;
 
 #[cfg(target_pointer_width = "64")]
 use super::wide::{self, Front, SLACK};
-use super::{Frame, HEAD_0, HEAD_1, MAX_BLOCK, count_head, xor};
+use super::{Frame, HEAD_0, HEAD_1, MAX_BLOCK};
 #[cfg(not(target_pointer_width = "64"))]
 const SLACK: usize = 0;
 
@@ -97,9 +97,10 @@ impl fmt::Display for Damage {
 pub struct Decoder {
     /// Bytes held, each doubled 82h once: of the open block, or still to be searched for a head.
     units: [u8; MAX_BLOCK + SLACK],
-    start: usize,
     end: usize,
-    /// Wire offset of `units[start]`.
+    /// How many units at the front are a frame that the caller has seen.
+    spent: usize,
+    /// Wire offset of the first unit that is not spent.
     base: u64,
     /// The units are an open block, whose head is at `base - 2`.
     in_block: bool,
@@ -124,8 +125,13 @@ impl Default for Decoder {
 
 /// What `step` found, without a borrow.
 enum Found {
-    Held { offset: u64, at: usize, len: usize },
-    Direct { offset: u64, at: usize, len: usize },
+    /// A block in `units` (held) or in the input.
+    Frame {
+        offset: u64,
+        held: bool,
+        at: usize,
+        len: usize,
+    },
     Damage(Damage),
 }
 
@@ -135,8 +141,8 @@ impl Decoder {
     pub const fn new() -> Self {
         Self {
             units: [0; MAX_BLOCK + SLACK],
-            start: 0,
             end: 0,
+            spent: 0,
             base: 0,
             in_block: false,
             escape: false,
@@ -197,12 +203,9 @@ impl Decoder {
         let item = match found {
             None => None,
             Some(Found::Damage(damage)) => Some(Item::Damage(damage)),
-            Some(Found::Held { offset, at, len }) => {
-                let block = self.units.get(at..at + len).unwrap_or(&[]);
-                Some(Item::Frame { offset, frame: Frame { block } })
-            }
-            Some(Found::Direct { offset, at, len }) => {
-                let block = input.get(at..at + len).unwrap_or(&[]);
+            Some(Found::Frame { offset, held, at, len }) => {
+                let source = if held { &self.units } else { input };
+                let block = source.get(at..at + len).unwrap_or(&[]);
                 Some(Item::Frame { offset, frame: Frame { block } })
             }
         };
@@ -213,7 +216,7 @@ impl Decoder {
     /// What follows from it comes out of the next calls of [`decode`](Self::decode) (an empty input
     /// will do). Without an open telegram this does nothing.
     pub fn gap(&mut self) {
-        self.gap = self.in_block || self.escape || self.start < self.end;
+        self.gap = self.in_block || self.escape || self.end > 0;
     }
 
     /// Whether a head, or the first byte of one, has been seen whose telegram is not complete.
@@ -233,7 +236,7 @@ impl Decoder {
     pub fn discarded(&self) -> u64 {
         let frontier = if self.in_block {
             self.base.saturating_sub(2)
-        } else if self.start < self.end {
+        } else if self.end > 0 {
             self.base
         } else {
             self.position.saturating_sub(u64::from(self.escape))
@@ -242,9 +245,10 @@ impl Decoder {
     }
 
     /// Nothing is held: the next byte stands outside of any telegram.
+    #[cfg(target_pointer_width = "64")]
     #[inline]
     fn idle(&self) -> bool {
-        !(self.in_block | self.escape | self.gap | (self.start < self.end))
+        !(self.in_block | self.escape | self.gap | (self.end > 0))
     }
 
     /// A whole telegram, `len` bytes after its head, is taken: returns the offset of its head.
@@ -259,6 +263,10 @@ impl Decoder {
     #[inline(never)]
     fn step(&mut self, input: &[u8]) -> (usize, Option<Found>) {
         let mut taken = 0;
+        if self.spent > 0 {
+            self.drop_front(self.spent);
+            self.spent = 0;
+        }
         loop {
             if !self.in_block
                 && let Some(found) = self.search_held()
@@ -287,26 +295,41 @@ impl Decoder {
             {
                 return (taken + len, Some(found));
             }
-            let run = self.block_run(input.get(taken..).unwrap_or(&[]));
-            if run > 0 {
-                taken += run;
-                continue;
+            #[cfg(target_pointer_width = "64")]
+            {
+                let run = self.block_run(input.get(taken..).unwrap_or(&[]));
+                if run > 0 {
+                    taken += run;
+                    continue;
+                }
             }
             let Some(&byte) = input.get(taken) else { return (taken, None) };
-            let found = if self.in_block { self.block_byte(byte) } else { self.search_byte(byte) };
-            if !matches!(found, ByteFound::Rejected(_)) {
-                taken += 1;
-                self.position += 1;
+            let waiting = self.escape;
+            if self.in_block && waiting && byte != HEAD_0 {
+                let kind = match byte {
+                    HEAD_1 => DamageKind::CutShort,
+                    found => DamageKind::RepeatMissing { found },
+                };
+                return (taken, Some(self.reject(kind)));
             }
-            match found {
-                ByteFound::Nothing => {}
-                ByteFound::Head => self.open_block(),
-                ByteFound::Garbage => {
-                    if let Some(found) = self.garbage() {
-                        return (taken, Some(found));
-                    }
+            taken += 1;
+            self.position += 1;
+            self.escape = byte == HEAD_0 && !(self.in_block && waiting);
+            if byte == HEAD_0 && !waiting {
+                continue;
+            }
+            if self.in_block {
+                // A block is judged after every byte, so it never outgrows `units`.
+                if let Some(unit) = self.units.get_mut(self.end) {
+                    *unit = byte;
+                    self.end += 1;
                 }
-                ByteFound::Rejected(kind) => return (taken, Some(self.reject(kind))),
+            } else if byte == HEAD_1 && waiting {
+                self.in_block = true;
+                self.base = self.position;
+                self.end = 0;
+            } else if let Some(found) = self.garbage() {
+                return (taken, Some(found));
             }
         }
     }
@@ -316,75 +339,89 @@ impl Decoder {
         let [HEAD_0, HEAD_1, number, ..] = *rest else { return None };
         let len = usize::from(number) + 1;
         let block = rest.get(2..2 + len)?;
-        if number < 2 || block.contains(&HEAD_0) || xor(block) != 0 {
+        let mut check = 0;
+        for &byte in block {
+            if byte == HEAD_0 {
+                return None;
+            }
+            check ^= byte;
+        }
+        if number < 2 || check != 0 {
             return None;
         }
         let offset = self.whole(len);
-        Some((2 + len, Found::Direct { offset, at: taken + 2, len }))
+        Some((2 + len, Found::Frame { offset, held: false, at: taken + 2, len }))
     }
 
     /// The open block is complete, or cannot become a frame, or `None`: it needs more bytes.
     fn judge_block(&mut self) -> Option<Found> {
-        let held = self.units.get(self.start..self.end)?;
+        let held = self.units.get(..self.end)?;
         let &number = held.first()?;
         if number < 2 {
             return Some(self.reject(DamageKind::Number { found: number }));
         }
         let len = usize::from(number) + 1;
         let block = held.get(..len)?;
-        let check = block.last().copied().unwrap_or(0);
-        let rest = xor(block);
+        let (mut rest, mut check, mut wire) = (0, 0, len);
+        for &byte in block {
+            rest ^= byte;
+            check = byte;
+            wire += usize::from(byte == HEAD_0);
+        }
         if rest != 0 {
             return Some(self.reject(DamageKind::CheckByte { expected: rest ^ check, found: check }));
         }
-        let offset = self.base.saturating_sub(2);
-        let at = self.start;
-        self.base += (len + count_head(block)) as u64;
-        self.start += len;
+        let offset = self.base.wrapping_sub(2);
+        self.base += wire as u64;
+        if self.end == len {
+            self.end = 0;
+        } else {
+            self.spent = len;
+        }
         self.in_block = false;
         self.good(offset, self.base);
-        Some(Found::Held { offset, at, len })
+        Some(Found::Frame { offset, held: true, at: 0, len })
     }
 
     /// Looks for a head among bytes held from a rejected block: 82h (sent twice, so that the second
     /// one begins the head and the first one is garbage) followed by 96h.
     fn search_held(&mut self) -> Option<Found> {
-        if self.start >= self.end {
+        if self.end == 0 {
             return None;
         }
         if let Some(found) = self.garbage() {
             return Some(found);
         }
-        let held = self.units.get(self.start..self.end).unwrap_or(&[]);
-        match held.windows(2).position(|pair| pair == [HEAD_0, HEAD_1]) {
-            Some(at) => {
-                let skipped = held.get(..=at).unwrap_or(&[]);
-                self.base += (skipped.len() + count_head(skipped) + 1) as u64;
-                let block = self.start + at + 2;
-                self.units.copy_within(block..self.end, 0);
-                self.end -= block;
+        let held = self.units.get(..self.end).unwrap_or(&[]);
+        let (mut wire, mut last) = (0_usize, 0);
+        for (at, &unit) in held.iter().enumerate() {
+            wire += 1 + usize::from(unit == HEAD_0);
+            if (last, unit) == (HEAD_0, HEAD_1) {
+                self.base += wire as u64;
+                self.drop_front(at + 1);
                 self.in_block = true;
+                return None;
             }
-            None => {
-                self.escape |= held.last() == Some(&HEAD_0);
-                self.end = 0;
-            }
+            last = unit;
         }
-        self.start = 0;
+        self.escape |= last == HEAD_0;
+        self.end = 0;
         None
     }
 
-    fn search_byte(&mut self, byte: u8) -> ByteFound {
-        let waiting = self.escape;
-        self.escape = byte == HEAD_0;
-        match (waiting, byte) {
-            (true, HEAD_1) => ByteFound::Head,
-            (false, HEAD_0) => ByteFound::Nothing,
-            _ => ByteFound::Garbage,
+    /// Drops `count` units, moves the others to the front.
+    fn drop_front(&mut self, count: usize) {
+        self.end = self.end.saturating_sub(count);
+        for to in 0..self.end {
+            let unit = self.units.get(count + to).copied().unwrap_or(0);
+            if let Some(room) = self.units.get_mut(to) {
+                *room = unit;
+            }
         }
     }
 
     /// Takes what the open block still wants up to the next 82h; returns how many bytes.
+    #[cfg(target_pointer_width = "64")]
     fn block_run(&mut self, rest: &[u8]) -> usize {
         if !self.in_block || self.escape {
             return 0;
@@ -405,39 +442,17 @@ impl Decoder {
         run
     }
 
-    fn block_byte(&mut self, byte: u8) -> ByteFound {
-        match (self.escape, byte) {
-            (false, HEAD_0) => {
-                self.escape = true;
-                return ByteFound::Nothing;
-            }
-            (true, HEAD_0) => self.escape = false,
-            (true, HEAD_1) => return ByteFound::Rejected(DamageKind::CutShort),
-            (true, found) => return ByteFound::Rejected(DamageKind::RepeatMissing { found }),
-            (false, _) => {}
-        }
-        // A block is judged after every byte, so it never outgrows `units`.
-        if let Some(unit) = self.units.get_mut(self.end) {
-            *unit = byte;
-            self.end += 1;
-        }
-        ByteFound::Nothing
-    }
-
-    fn open_block(&mut self) {
-        self.in_block = true;
-        self.base = self.position;
-        self.start = 0;
-        self.end = 0;
-    }
-
+    #[cold]
+    #[inline(never)]
     fn reject(&mut self, kind: DamageKind) -> Found {
         self.in_block = false;
         self.reported = true;
-        Found::Damage(Damage { offset: self.base.saturating_sub(2), kind })
+        Found::Damage(Damage { offset: self.base.wrapping_sub(2), kind })
     }
 
     /// Reports garbage once between two good frames, unless other damage was reported there.
+    #[cold]
+    #[inline(never)]
     fn garbage(&mut self) -> Option<Found> {
         if core::mem::replace(&mut self.reported, true) {
             return None;
@@ -447,18 +462,10 @@ impl Decoder {
 
     #[inline]
     fn good(&mut self, from: u64, to: u64) {
-        self.discarded = self.discarded.saturating_add(from.saturating_sub(self.accounted));
+        self.discarded = self.discarded.wrapping_add(from.wrapping_sub(self.accounted));
         self.accounted = to;
         self.reported = false;
     }
-}
-
-enum ByteFound {
-    Nothing,
-    Head,
-    Garbage,
-    /// The block is no frame; the byte is not taken.
-    Rejected(DamageKind),
 }
 
 #[cfg(test)]

@@ -51,15 +51,17 @@ fn encode_bytes(function: u8, data: &[u8], out: &mut [u8]) -> Result<usize, Enco
     let number = number(data)?;
     let len = out.len();
     let mut writer = Writer { out, at: 0, check: 0 };
-    let written = writer.raw(HEAD_0).and_then(|()| writer.raw(HEAD_1)).and_then(|()| {
-        writer.unit(number)?;
-        writer.unit(function)?;
-        data.iter().try_for_each(|&byte| writer.unit(byte))?;
-        writer.unit(writer.check)
-    });
-    match written {
-        Some(()) => Ok(writer.at),
-        None => Err(EncodeError::BufferTooSmall { needed: encoded_len(function, data)?, len }),
+    writer.raw(HEAD_0);
+    writer.raw(HEAD_1);
+    writer.unit(number);
+    writer.unit(function);
+    for &byte in data {
+        writer.unit(byte);
+    }
+    writer.unit(writer.check);
+    match writer.at {
+        needed if needed > len => Err(EncodeError::BufferTooSmall { needed, len }),
+        written => Ok(written),
     }
 }
 
@@ -80,6 +82,7 @@ fn number(data: &[u8]) -> Result<u8, EncodeError> {
     }
 }
 
+/// Writes as far as there is room, and counts on.
 struct Writer<'a> {
     out: &'a mut [u8],
     at: usize,
@@ -87,19 +90,19 @@ struct Writer<'a> {
 }
 
 impl Writer<'_> {
-    fn raw(&mut self, byte: u8) -> Option<()> {
-        *self.out.get_mut(self.at)? = byte;
+    fn raw(&mut self, byte: u8) {
+        if let Some(room) = self.out.get_mut(self.at) {
+            *room = byte;
+        }
         self.at += 1;
-        Some(())
     }
 
-    fn unit(&mut self, byte: u8) -> Option<()> {
+    fn unit(&mut self, byte: u8) {
         self.check ^= byte;
-        self.raw(byte)?;
+        self.raw(byte);
         if byte == HEAD_0 {
-            self.raw(byte)?;
+            self.raw(byte);
         }
-        Some(())
     }
 }
 
