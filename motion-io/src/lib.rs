@@ -3,6 +3,7 @@
 // The one crate of the family, beside the program, that reads a clock.
 #![allow(clippy::disallowed_methods)]
 
+pub mod can;
 pub mod capture;
 #[cfg(feature = "tokio")]
 pub mod codec;

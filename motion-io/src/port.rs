@@ -78,7 +78,7 @@ pub enum OpenError {
 }
 
 impl OpenError {
-    pub(crate) fn new(endpoint: &Endpoint, error: io::Error) -> Self {
+    pub(crate) fn new(endpoint: &impl ToString, error: io::Error) -> Self {
         let endpoint = endpoint.to_string();
         match error.kind() {
             io::ErrorKind::NotFound => Self::Missing { endpoint },

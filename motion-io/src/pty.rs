@@ -13,6 +13,9 @@ use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
 use crate::port::Port;
 
+/// So long bytes wait for a reader before they are given up.
+const UNREAD: rustix::event::Timespec = rustix::event::Timespec { tv_sec: 1, tv_nsec: 0 };
+
 /// The controlling end of a pseudo-terminal.
 #[derive(Debug)]
 pub(crate) struct Pty {
@@ -48,6 +51,8 @@ impl Pty {
             }
             Err(_) => {}
         }
+        // A full line must not hold the writer for ever.
+        rustix::io::ioctl_fionbio(&end, true)?;
         std::os::unix::fs::symlink(&other_path, link)?;
         Ok(Self { end: File::from(end), _other: other, other_path, link: link.to_path_buf() })
     }
@@ -74,6 +79,24 @@ impl Port for Pty {
     }
 
     fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
-        self.end.write_all(bytes)
+        let mut rest = bytes;
+        while !rest.is_empty() {
+            let mut ready = [PollFd::new(&self.end, PollFlags::OUT)];
+            match poll(&mut ready, Some(&UNREAD)) {
+                Ok(0) => {
+                    let text = "nobody reads the other end of the pseudo-terminal";
+                    return Err(io::Error::new(io::ErrorKind::TimedOut, text));
+                }
+                Ok(_) => {}
+                Err(rustix::io::Errno::INTR) => continue,
+                Err(error) => return Err(error.into()),
+            }
+            match self.end.write(rest) {
+                Ok(len) => rest = rest.get(len..).unwrap_or(&[]),
+                Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(())
     }
 }

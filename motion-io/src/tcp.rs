@@ -34,12 +34,33 @@ pub(crate) fn open(endpoint: &Endpoint, address: &str, role: Role) -> Result<Box
     }
 }
 
+/// Waits for bytes, or the end of the stream.
+#[cfg(unix)]
+fn readable(stream: &TcpStream, timeout: Duration) -> io::Result<bool> {
+    // The socket's own time limit is rounded up to the kernel's ticks, several milliseconds.
+    use rustix::event::{PollFd, PollFlags, Timespec, poll};
+    let limit = Timespec::try_from(timeout).map_err(io::Error::other)?;
+    match poll(&mut [PollFd::new(stream, PollFlags::IN)], Some(&limit)) {
+        Ok(ready) => Ok(ready > 0),
+        Err(rustix::io::Errno::INTR) => Ok(false),
+        Err(error) => Err(error.into()),
+    }
+}
+
+#[cfg(not(unix))]
+fn readable(stream: &TcpStream, timeout: Duration) -> io::Result<bool> {
+    // A zero limit would mean "for ever". The read that follows ends in time.
+    stream.set_read_timeout(Some(timeout.max(Duration::from_millis(1))))?;
+    Ok(true)
+}
+
 struct Stream(TcpStream);
 
 impl Port for Stream {
     fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<usize> {
-        // A zero limit would mean "for ever".
-        self.0.set_read_timeout(Some(timeout.max(Duration::from_millis(1))))?;
+        if !readable(&self.0, timeout)? {
+            return Ok(0);
+        }
         match self.0.read(buffer) {
             Ok(0) => Err(io::Error::new(io::ErrorKind::BrokenPipe, "the peer closed the connection")),
             Ok(len) => Ok(len),

@@ -105,6 +105,8 @@ pub struct Statistics {
 #[derive(Debug)]
 struct Station {
     connected: bool,
+    /// Taken away for good.
+    vacant: bool,
     /// Every frame that it sends meets a bit error.
     broken: bool,
     counters: Counters,
@@ -234,8 +236,9 @@ impl Bus {
 
     /// Adds a station, error active.
     pub fn connect(&mut self) -> StationId {
-        self.stations.push(Station {
+        let new = Station {
             connected: true,
+            vacant: false,
             broken: false,
             counters: Counters::default(),
             state: State::Active,
@@ -243,8 +246,22 @@ impl Bus {
             suspended: Duration::ZERO,
             recovering: None,
             inbox: VecDeque::new(),
-        });
+        };
+        if let Some((index, place)) = self.stations.iter_mut().enumerate().find(|(_, old)| old.vacant) {
+            *place = new;
+            return StationId(index);
+        }
+        self.stations.push(new);
         StationId(self.stations.len() - 1)
+    }
+
+    /// Takes a station away for good; its place goes to the next one that connects.
+    pub fn disconnect(&mut self, station: StationId) {
+        self.plug(station, false);
+        if let Some(station) = self.stations.get_mut(station.0) {
+            station.vacant = true;
+            station.inbox.clear();
+        }
     }
 
     /// Plugs a station's connector out (`false`), its queue emptied, or in again, error active.

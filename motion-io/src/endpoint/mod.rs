@@ -6,6 +6,20 @@
 //! | `serial:/dev/ttyUSB0?baud=9600&parity=none&stop=2` | the same with other settings |
 //! | `tcp:HOST:PORT` | a byte stream over TCP |
 //! | `pty:LINK` | a pseudo-terminal made by us, linked at the path LINK |
+//!
+//! CAN:
+//!
+//! | written | means |
+//! |---|---|
+//! | `socketcan:can0` | a CAN interface of the Linux kernel |
+//! | `slcan:/dev/ttyACM0?bitrate=500000` | a serial adapter that speaks slcan |
+//! | `slcan-pty:LINK` | be the adapter: others open LINK with their slcan driver |
+//! | `socketcand:HOST:PORT/can0` | a bus of a socketcand server |
+//! | `virtual:NAME` | a virtual bus inside this process |
+
+mod can;
+
+pub use can::{CanEndpoint, SLCAN_BIT_RATES};
 
 use core::fmt;
 use core::str::FromStr;
@@ -85,9 +99,22 @@ pub enum EndpointError {
     /// `tcp:` without host or port number.
     #[error("{0:?}: tcp:HOST:PORT expected, PORT a number up to 65535")]
     Tcp(String),
-    /// A setting that serial lines do not have.
-    #[error("unknown setting {0:?}: baud, parity or stop expected")]
-    Setting(String),
+    /// No CAN endpoint.
+    #[error(
+        "{0:?}: socketcan:can0, slcan:PATH?bitrate=500000, slcan-pty:LINK, socketcand:HOST:PORT/BUS or virtual:NAME expected"
+    )]
+    Can(String),
+    /// `socketcand:` without host, port number or bus.
+    #[error("{0:?}: socketcand:HOST:PORT/BUS expected, PORT a number up to 65535")]
+    Socketcand(String),
+    /// A setting that such endpoints do not have.
+    #[error("unknown setting {setting:?}: {expected} expected")]
+    Setting {
+        /// What came.
+        setting: String,
+        /// Settings that there are.
+        expected: &'static str,
+    },
     /// A value that a setting does not take.
     #[error("{setting} {value:?}: {expected} expected")]
     Value {
@@ -158,7 +185,10 @@ impl Settings {
                     _ => return Err(wrong("stop", "1 or 2")),
                 };
             }
-            _ => return Err(EndpointError::Setting(setting.into())),
+            _ => {
+                let expected = "baud, parity or stop";
+                return Err(EndpointError::Setting { setting: setting.into(), expected });
+            }
         }
         Ok(())
     }

@@ -1,0 +1,137 @@
+//! Engines on an open CAN endpoint.
+
+use core::time::Duration;
+use std::io;
+use std::time::Instant;
+
+use pdo::Frame;
+
+use super::{BusEvent, CanPort, Event};
+
+/// What drives an engine: frames and time in, frames out. Engines have methods of these names.
+pub trait Engine {
+    /// A frame of another station.
+    fn handle_frame(&mut self, now: Duration, frame: &Frame);
+    /// Time goes on; a spurious call changes nothing.
+    fn handle_timeout(&mut self, now: Duration);
+    /// The next frame to send.
+    fn poll_transmit(&mut self, now: Duration) -> Option<Frame>;
+    /// When to call [`handle_timeout`](Self::handle_timeout); `None` = idle.
+    fn poll_timeout(&self) -> Option<Duration>;
+}
+
+#[cfg(feature = "virtual")]
+impl<N: device_sim::can::Node> Engine for N {
+    fn handle_frame(&mut self, now: Duration, frame: &Frame) {
+        device_sim::can::Node::handle_frame(self, now, frame);
+    }
+
+    fn handle_timeout(&mut self, now: Duration) {
+        device_sim::can::Node::handle_timeout(self, now);
+    }
+
+    fn poll_transmit(&mut self, now: Duration) -> Option<Frame> {
+        device_sim::can::Node::poll_transmit(self, now)
+    }
+
+    fn poll_timeout(&self) -> Option<Duration> {
+        device_sim::can::Node::poll_timeout(self)
+    }
+}
+
+/// While a frame waits for room in the transmit queue, it is offered again so often.
+const RETRY: Duration = Duration::from_millis(2);
+/// Frames that are taken in one turn before the engine is asked what to send.
+const BATCH: usize = 32;
+
+/// An endpoint and the clock that its engine sees: time since the driver was made.
+pub struct Driver {
+    port: Box<dyn CanPort>,
+    start: Instant,
+    /// Taken from the engine, not yet by the endpoint.
+    held: Option<Frame>,
+}
+
+impl core::fmt::Debug for Driver {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.debug_struct("Driver").field("held", &self.held).finish_non_exhaustive()
+    }
+}
+
+impl Driver {
+    /// Drives engines on `port`.
+    #[must_use]
+    pub fn new(port: Box<dyn CanPort>) -> Self {
+        Self { port, start: Instant::now(), held: None }
+    }
+
+    /// The engine's time.
+    #[must_use]
+    pub fn now(&self) -> Duration {
+        self.start.elapsed()
+    }
+
+    /// Sends what the engine has to send, then waits for frames until the engine's next timeout, at most
+    /// until `limit` on the engine's clock. Frames that the endpoint's queue does not take wait, in order.
+    /// `observe` sees everything that came and, as [`Event::Frame`] with `true`, everything that was sent.
+    ///
+    /// # Errors
+    /// The endpoint failed or is gone.
+    pub fn turn(
+        &mut self,
+        engine: &mut dyn Engine,
+        limit: Duration,
+        mut observe: impl FnMut(Duration, Event, bool),
+    ) -> io::Result<()> {
+        let now = self.now();
+        while let Some(frame) = self.held.take().or_else(|| engine.poll_transmit(now)) {
+            match self.port.send(&frame) {
+                Ok(()) => observe(now, Event::Frame(frame), true),
+                Err(error)
+                    if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::NetworkDown) =>
+                {
+                    self.held = Some(frame);
+                    break;
+                }
+                Err(error) => return Err(error),
+            }
+        }
+        let mut until = engine.poll_timeout().map_or(limit, |at| at.min(limit));
+        let now = self.now();
+        if self.held.is_some() {
+            until = until.min(now.saturating_add(RETRY));
+        }
+        let mut timeout = until.saturating_sub(now);
+        for _ in 0..BATCH {
+            let Some(event) = self.port.receive(timeout)? else { break };
+            let now = self.now();
+            if let Event::Frame(frame) = &event {
+                engine.handle_frame(now, frame);
+            }
+            observe(now, event, false);
+            timeout = Duration::ZERO;
+        }
+        let now = self.now();
+        if engine.poll_timeout().is_some_and(|at| at <= now) {
+            engine.handle_timeout(now);
+        }
+        Ok(())
+    }
+
+    /// Like [`turn`](Self::turn), telling only what the bus says.
+    ///
+    /// # Errors
+    /// The endpoint failed or is gone.
+    pub fn run(
+        &mut self,
+        engine: &mut dyn Engine,
+        limit: Duration,
+        mut bus: impl FnMut(BusEvent),
+    ) -> io::Result<()> {
+        self.turn(engine, limit, |_, event, _| {
+            if let Event::Bus(event) = event {
+                bus(event);
+            }
+        })
+    }
+}

@@ -1,0 +1,169 @@
+//! CAN endpoints, opened: frames out, frames and what the bus says in, with a time limit; and engines
+//! driven on them by the machine's clock.
+
+mod drive;
+mod slcan;
+#[cfg(all(feature = "socketcan", target_os = "linux"))]
+mod socketcan;
+mod socketcand;
+#[cfg(feature = "virtual")]
+mod virtual_bus;
+
+use core::fmt;
+use core::time::Duration;
+use std::io;
+
+use pdo::Frame;
+
+pub use drive::{Driver, Engine};
+#[cfg(feature = "virtual")]
+pub use socketcand::Server;
+#[cfg(feature = "virtual")]
+pub use virtual_bus::{VirtualBus, VirtualPort};
+
+use crate::endpoint::{CanEndpoint, Endpoint, Parity, Settings};
+use crate::port::{OpenError, Role};
+
+/// What comes from an open CAN endpoint.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Event {
+    /// A frame of another station.
+    Frame(Frame),
+    /// Something about the bus or the adapter.
+    Bus(BusEvent),
+}
+
+/// What an endpoint tells about its bus. Which of them come depends on the adapter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum BusEvent {
+    /// The controller's error state has changed.
+    State(BusState),
+    /// An error frame.
+    Error(BusError),
+    /// Frames were lost because nobody fetched them in time.
+    Overrun,
+    /// A frame that was sent before has not been taken by the adapter.
+    NotSent,
+}
+
+/// Error state of a CAN controller (ISO 11898-1, fault confinement).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum BusState {
+    /// All well.
+    Active,
+    /// An error counter has reached 96.
+    Warning,
+    /// An error counter is above 127.
+    Passive,
+    /// The controller is off the bus.
+    Off,
+}
+
+/// What an error frame was about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum BusError {
+    /// Nobody acknowledged a frame.
+    NoAcknowledge,
+    /// Bit, stuff, form or CRC error.
+    Protocol,
+    /// The driver waited too long for a frame to go out.
+    TransmitTimeout,
+    /// The transceiver reports a fault of the wires.
+    Transceiver,
+    /// A bus error without details.
+    Unspecified,
+}
+
+impl fmt::Display for BusState {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Active => "error active",
+            Self::Warning => "error warning",
+            Self::Passive => "error passive",
+            Self::Off => "bus-off",
+        })
+    }
+}
+
+impl fmt::Display for BusEvent {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::State(state) => state.fmt(f),
+            Self::Error(error) => f.write_str(match error {
+                BusError::NoAcknowledge => {
+                    "no acknowledge: no other station is on the bus, or at another bit rate"
+                }
+                BusError::Protocol => "error frame: bit, stuff, form or CRC error",
+                BusError::TransmitTimeout => "a frame could not be sent in time",
+                BusError::Transceiver => "the transceiver reports a fault of the wires",
+                BusError::Unspecified => "bus error",
+            }),
+            Self::Overrun => f.write_str("frames were lost: received faster than fetched"),
+            Self::NotSent => f.write_str("the adapter did not take a frame"),
+        }
+    }
+}
+
+/// An open CAN endpoint.
+pub trait CanPort: Send {
+    /// Sends a frame, or queues it for sending.
+    ///
+    /// # Errors
+    /// [`io::ErrorKind::WouldBlock`]: the transmit queue is full and the frame was not taken, try again
+    /// later; [`io::ErrorKind::NetworkDown`]: the bus is off, the frame was not taken. Anything else: the
+    /// endpoint failed or is gone.
+    fn send(&mut self, frame: &Frame) -> io::Result<()>;
+
+    /// Waits up to `timeout` for a frame or an event of the bus.
+    ///
+    /// # Errors
+    /// The endpoint failed or is gone.
+    fn receive(&mut self, timeout: Duration) -> io::Result<Option<Event>>;
+}
+
+/// Opens an endpoint.
+///
+/// # Errors
+/// [`OpenError`] names the endpoint and what is wrong with it.
+pub fn open(endpoint: &CanEndpoint) -> Result<Box<dyn CanPort>, OpenError> {
+    match endpoint {
+        CanEndpoint::SocketCan { interface } => {
+            #[cfg(all(feature = "socketcan", target_os = "linux"))]
+            return socketcan::open(endpoint, interface);
+            #[cfg(not(all(feature = "socketcan", target_os = "linux")))]
+            return {
+                let _ = interface;
+                Err(OpenError::NotBuilt { endpoint: endpoint.to_string(), feature: "socketcan" })
+            };
+        }
+        CanEndpoint::Slcan { path, bit_rate, baud } => {
+            let settings = Settings { baud: *baud, parity: Parity::None, stop_bits: 1 };
+            let line = Endpoint::Serial { path: path.clone(), settings };
+            let port = crate::port::open(&line, Role::Master)?;
+            let host = slcan::Host::new(port, *bit_rate).map_err(|error| OpenError::new(endpoint, error))?;
+            Ok(Box::new(host))
+        }
+        CanEndpoint::SlcanPty { link } => {
+            let port = crate::port::open(&Endpoint::Pty { link: link.clone() }, Role::Device)?;
+            Ok(Box::new(slcan::AdapterPort::new(port)))
+        }
+        CanEndpoint::Socketcand { address, bus } => {
+            let port = crate::port::open(&Endpoint::Tcp { address: address.clone() }, Role::Master)?;
+            let client =
+                socketcand::Client::new(port, bus).map_err(|error| OpenError::new(endpoint, error))?;
+            Ok(Box::new(client))
+        }
+        CanEndpoint::Virtual { name } => {
+            #[cfg(feature = "virtual")]
+            return Ok(Box::new(VirtualBus::named(name).connect()));
+            #[cfg(not(feature = "virtual"))]
+            return {
+                let _ = name;
+                Err(OpenError::NotBuilt { endpoint: endpoint.to_string(), feature: "virtual" })
+            };
+        }
+    }
+}

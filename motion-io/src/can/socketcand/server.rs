@@ -1,0 +1,214 @@
+//! A socketcand server for virtual buses.
+
+use core::net::SocketAddr;
+use core::sync::atomic::{AtomicBool, Ordering};
+use core::time::Duration;
+use std::io::{self, Read, Write};
+use std::net::{TcpListener, TcpStream};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::SystemTime;
+
+use super::super::{BusError, BusEvent, BusState, CanPort, Event, VirtualBus, VirtualPort};
+use super::{Messages, frame_message, parse_send};
+
+/// How often a waiting thread looks whether it is to end.
+const POLL: Duration = Duration::from_millis(100);
+/// A client that takes nothing for so long is dropped.
+const WRITE: Duration = Duration::from_secs(1);
+/// Clients compare the answer to `< rawmode >` with what one read brings, so frames follow a little later.
+const AFTER_RAWMODE: Duration = Duration::from_millis(20);
+/// Frames that came before the bus had room are tried again so often.
+const RETRY: Duration = Duration::from_millis(1);
+
+/// Serves virtual buses to other programs over TCP.
+#[derive(Debug)]
+pub struct Server {
+    listener: TcpListener,
+    buses: Vec<(String, VirtualBus)>,
+}
+
+impl Server {
+    /// Listens on `address` (`HOST:PORT`, port 0 = any that is free).
+    ///
+    /// # Errors
+    /// The address cannot be had.
+    pub fn bind(address: &str, buses: Vec<(String, VirtualBus)>) -> io::Result<Self> {
+        let listener = TcpListener::bind(address)?;
+        listener.set_nonblocking(true)?;
+        Ok(Self { listener, buses })
+    }
+
+    /// Where it listens.
+    ///
+    /// # Errors
+    /// The system cannot tell.
+    pub fn address(&self) -> io::Result<SocketAddr> {
+        self.listener.local_addr()
+    }
+
+    /// Serves clients, each with threads of its own, until `stop` is set.
+    ///
+    /// # Errors
+    /// The listener failed.
+    pub fn serve(&self, stop: &Arc<AtomicBool>) -> io::Result<()> {
+        while !stop.load(Ordering::Relaxed) {
+            match self.listener.accept() {
+                Ok((stream, _)) => {
+                    let (buses, stop) = (self.buses.clone(), Arc::clone(stop));
+                    std::thread::spawn(move || {
+                        // A client that is gone concerns nobody else.
+                        let _ = Session::run(stream, &buses, &stop);
+                    });
+                }
+                Err(error) if error.kind() == io::ErrorKind::WouldBlock => {
+                    std::thread::sleep(POLL / 10);
+                }
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(())
+    }
+}
+
+/// One client, as both of its threads see it.
+struct Session {
+    stream: TcpStream,
+    /// Both threads write.
+    out: Mutex<TcpStream>,
+    raw: AtomicBool,
+    ended: AtomicBool,
+}
+
+impl Session {
+    fn run(stream: TcpStream, buses: &[(String, VirtualBus)], stop: &AtomicBool) -> io::Result<()> {
+        stream.set_nonblocking(false)?;
+        stream.set_nodelay(true)?;
+        stream.set_read_timeout(Some(POLL))?;
+        stream.set_write_timeout(Some(WRITE))?;
+        let session = Self {
+            out: Mutex::new(stream.try_clone()?),
+            stream,
+            raw: AtomicBool::new(false),
+            ended: AtomicBool::new(false),
+        };
+        session.say("< hi >")?;
+        std::thread::scope(|scope| {
+            let done = session.read(buses, stop, |port| {
+                scope.spawn(|| session.forward(port));
+            });
+            session.ended.store(true, Ordering::Relaxed);
+            done
+        })
+    }
+
+    fn say(&self, text: &str) -> io::Result<()> {
+        self.out.lock().unwrap_or_else(PoisonError::into_inner).write_all(text.as_bytes())
+    }
+
+    fn read(
+        &self,
+        buses: &[(String, VirtualBus)],
+        stop: &AtomicBool,
+        mut open: impl FnMut(VirtualPort),
+    ) -> io::Result<()> {
+        let mut messages = Messages::default();
+        let mut port: Option<VirtualPort> = None;
+        let mut buffer = [0; 2048];
+        while !stop.load(Ordering::Relaxed) && !self.ended.load(Ordering::Relaxed) {
+            let len = match (&self.stream).read(&mut buffer) {
+                Ok(0) => return Ok(()),
+                Ok(len) => len,
+                Err(error)
+                    if matches!(
+                        error.kind(),
+                        io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut | io::ErrorKind::Interrupted
+                    ) =>
+                {
+                    continue;
+                }
+                Err(error) => return Err(error),
+            };
+            for &byte in buffer.get(..len).unwrap_or(&[]) {
+                let Some(message) = messages.push(byte) else { continue };
+                let mut words = message.split_whitespace();
+                match (words.next().unwrap_or(""), &mut port) {
+                    ("echo", _) => self.say("< echo >")?,
+                    ("open", None) => {
+                        let name = words.next().unwrap_or("");
+                        let Some((_, bus)) = buses.iter().find(|(known, _)| known == name) else {
+                            return self.say("< error could not open bus >");
+                        };
+                        let new = bus.connect();
+                        open(new.clone());
+                        port = Some(new);
+                        self.say("< ok >")?;
+                    }
+                    ("rawmode", Some(_)) => {
+                        self.say("< ok >")?;
+                        self.raw.store(true, Ordering::Relaxed);
+                    }
+                    ("bcmmode", Some(_)) => {
+                        self.raw.store(false, Ordering::Relaxed);
+                        self.say("< ok >")?;
+                    }
+                    (command @ ("send" | "sendrtr"), Some(port)) => {
+                        match parse_send(words, command == "sendrtr") {
+                            Some(frame) => self.send(port, &frame, stop)?,
+                            None => self.say("< error syntax >")?,
+                        }
+                    }
+                    _ => self.say("< error unknown command >")?,
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The stream itself holds back a client that sends faster than its bus.
+    fn send(&self, port: &mut VirtualPort, frame: &pdo::Frame, stop: &AtomicBool) -> io::Result<()> {
+        loop {
+            match port.send(frame) {
+                Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
+                // Bus-off: as on a real interface, what is sent meanwhile is lost, and the client was told.
+                Err(error) if error.kind() == io::ErrorKind::NetworkDown => return Ok(()),
+                sent => return sent,
+            }
+            if stop.load(Ordering::Relaxed) || self.ended.load(Ordering::Relaxed) {
+                return Ok(());
+            }
+            std::thread::sleep(RETRY);
+        }
+    }
+
+    /// Bus to client.
+    fn forward(&self, mut port: VirtualPort) {
+        let mut raw = false;
+        while !self.ended.load(Ordering::Relaxed) {
+            if self.raw.load(Ordering::Relaxed) != raw {
+                raw = !raw;
+                std::thread::sleep(AFTER_RAWMODE);
+            }
+            let Ok(event) = port.receive(POLL) else { break };
+            let Some(event) = event.filter(|_| self.raw.load(Ordering::Relaxed)) else { continue };
+            let at = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+            let text = match event {
+                Event::Frame(frame) => frame_message(&frame, at),
+                Event::Bus(event) => {
+                    let class = match event {
+                        BusEvent::State(BusState::Off) => 0x40,
+                        BusEvent::State(BusState::Active) => 0x100,
+                        BusEvent::Error(BusError::NoAcknowledge) => 0x20,
+                        BusEvent::Error(BusError::Protocol) => 0x08,
+                        BusEvent::State(_) | BusEvent::Overrun => 0x04,
+                        BusEvent::Error(_) | BusEvent::NotSent => 0x80,
+                    };
+                    format!("< error {class:03X} {}.{:06} >", at.as_secs(), at.subsec_micros())
+                }
+            };
+            if self.say(&text).is_err() {
+                break;
+            }
+        }
+        self.ended.store(true, Ordering::Relaxed);
+    }
+}
