@@ -58,6 +58,8 @@ pub(crate) enum Command {
         #[command(subcommand)]
         command: Sim,
     },
+    /// Virtual CAN buses for other programs, over the socketcand protocol, until stopped
+    Bus(crate::can::cli::Bus),
     /// Serial ports found
     Ports,
     /// LB2 functions one by one

@@ -6,6 +6,7 @@
 // The program, with motion-io, is what reads the machine's clock.
 #![allow(clippy::disallowed_methods)]
 
+mod can;
 mod cli;
 mod connect;
 mod demo;
@@ -27,6 +28,7 @@ fn main() -> ExitCode {
     let done = match cli.command {
         Command::Demo => demo::run(&out),
         Command::Sim { command } => sim::run(&out, &command),
+        Command::Bus(arguments) => can::bus::run(&out, &arguments),
         Command::Ports => ports(&out),
         Command::Lb2 { command } => lb2::run(&out, &cli.global, &command),
         Command::Params { command } => params::run(&out, &cli.global, &command),
