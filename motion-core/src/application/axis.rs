@@ -121,7 +121,6 @@ pub struct AxisAccess {
     pub(crate) activated: bool,
 }
 
-#[allow(dead_code, reason = "the controller's cycle is the other side")]
 impl AxisAccess {
     /// What the axis was at the begin of the cycle.
     #[must_use]

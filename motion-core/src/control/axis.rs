@@ -1,0 +1,65 @@
+//! What the cycle and an axis exchange.
+
+use lb2::code::Failure;
+
+use crate::application::{AxisStatus, Order, Progress};
+use crate::input::ActualValue;
+use crate::io::DigitalInputs;
+use crate::output::Command;
+use crate::parameters::Values;
+
+/// How axes stop with the application, `[004]`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PlcStop {
+    /// Greatest deceleration, without feedback control.
+    Control,
+    /// As the axis is configured.
+    Regulate,
+}
+
+/// What an axis is given in one cycle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AxisInput {
+    /// Actual value. Its `shift` moves the set values alike; `real` is false while there is no reading,
+    /// and `failure` stops the axis. An axis without an input (`[606]` Virtual, Stepper motor) takes
+    /// `position` as the steps of its motor.
+    pub actual: ActualValue,
+    /// I1…I4, for the hardware limit switches.
+    pub digital: DigitalInputs,
+    /// Whether the drive is to be enabled.
+    pub power: bool,
+    /// Whether a stop is held.
+    pub held: bool,
+    /// Acknowledges a failure.
+    pub reset: bool,
+    /// A new order; it takes the place of the one before.
+    pub order: Option<Order>,
+    /// The application has stopped in this cycle.
+    pub stop: Option<PlcStop>,
+    /// The drive on the CAN bus failed.
+    pub failure: Option<Failure>,
+}
+
+/// What an axis gives in one cycle.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct AxisOutput {
+    /// For its nominal value output.
+    pub command: Command,
+    /// For the application.
+    pub status: AxisStatus,
+    /// How the present order ended in this cycle.
+    pub ended: Option<Progress>,
+    /// Whether its input is to calibrate on the reference signal.
+    pub armed: bool,
+    /// To be stored; that of the actual value is stored anyway.
+    pub failure: Option<Failure>,
+}
+
+/// The control of one axis.
+pub trait AxisControl {
+    /// Takes over the parameters of axis `at`, 0…5, and the length of a cycle, ms; also while moving.
+    fn configure(&mut self, values: &Values, at: usize, cycle: u16);
+
+    /// One cycle.
+    fn cycle(&mut self, input: &AxisInput) -> AxisOutput;
+}
