@@ -3,7 +3,8 @@
 //! [`read`] takes the bytes of a file, whatever its format and encoding, and gives a [`Device`]: the
 //! objects with data type, access, limits, default, configured value, and everything else the file
 //! says. Reading is lenient: what can be understood is, and every doubt is a [`Diagnostic`] with its
-//! line.
+//! line. [`Reading::update`] writes a changed device back into its file, leaving every line as it
+//! stands that the change does not concern; [`write_eds`] writes a file anew.
 //!
 //! Clauses are those of CiA 306-1 version 1.4, CiA 301 version 4.2 and CiA 311.
 
@@ -16,6 +17,8 @@ mod objects;
 mod reader;
 mod types;
 mod value;
+mod writer;
+mod xdd;
 
 use alloc::borrow::Cow;
 use alloc::string::String;
@@ -26,6 +29,8 @@ pub use encoding::Encoding;
 pub use model::{Device, Entry, Fields, Module, Object, Section};
 pub use types::{Access, DataType, List, ObjectType, PdoMapping};
 pub use value::{Number, ValueError, fit, from_bytes, to_bytes};
+pub use writer::write_eds;
+pub use xdd::write_xdd;
 
 use reader::Findings;
 
@@ -60,6 +65,27 @@ pub struct Reading {
     pub source: Source,
 }
 
+impl Reading {
+    /// The file with the changes that make it say what `device` says. Every line that no change
+    /// concerns stays as it is; without a change the text is the file's, to the last blank.
+    #[must_use]
+    pub fn update(&self, device: &Device) -> String {
+        let update = match self.source.format {
+            Format::Eds => writer::update,
+            Format::Xdd => xdd::update,
+        };
+        update(&self.source.text, &self.device, device)
+    }
+}
+
+impl Source {
+    /// The bytes of a text in this file's encoding; in UTF-8 where that lacks a character.
+    #[must_use]
+    pub fn encode(&self, text: &str) -> Vec<u8> {
+        self.encoding.encode(text).unwrap_or_else(|| text.as_bytes().to_vec())
+    }
+}
+
 /// Why a file is refused.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -76,6 +102,36 @@ pub enum ReadError {
         /// Lines in the file.
         lines: usize,
     },
+    /// XML that is no XML.
+    #[error("not well-formed XML: {message}")]
+    Xml {
+        /// Line, from 1.
+        line: u32,
+        /// Column, from 1.
+        column: u32,
+        /// What the XML reader says, with the position.
+        message: String,
+    },
+    /// XML of another kind.
+    #[error(
+        "no CANopen device description: the root element is {root} of namespace \"{namespace}\", where CiA 311 has \
+         ISO15745ProfileContainer of \"http://www.canopen.org/xml/1.1\" or 1.0"
+    )]
+    NotCanopenXml {
+        /// Name of the root element.
+        root: String,
+        /// Its namespace.
+        namespace: String,
+    },
+    /// A profile container without CANopen objects, as other fieldbuses have.
+    #[error("no CANopen device description: {root} holds no CANopenObjectList with an object")]
+    NoObjectList {
+        /// Name of the root element.
+        root: String,
+    },
+    /// A project file of CANopenEditor without a device.
+    #[error("a project file that holds no device description")]
+    EmptyProject,
 }
 
 /// Reads an EDS, DCF, XDD or XDC file. Format and encoding are told from the content.
@@ -99,18 +155,24 @@ pub fn read_as(bytes: &[u8], encoding: Encoding) -> Result<Reading, ReadError> {
         return Err(ReadError::Binary(offset));
     }
     let mut findings = Findings::default();
-    if !matches!(encoding, Encoding::Ascii) {
-        let message = alloc::format!("characters beyond ASCII, read as {}", encoding.name());
-        findings.add(first_beyond_ascii(&text), Rule::Encoding, message);
-    }
-    let device = read_eds(&text, &mut findings)?;
+    let format = if text.trim_start().starts_with('<') { Format::Xdd } else { Format::Eds };
+    let device = match format {
+        Format::Eds => {
+            if !matches!(encoding, Encoding::Ascii) {
+                let message = alloc::format!("characters beyond ASCII, read as {}", encoding.name());
+                findings.add(first_beyond_ascii(&text), Rule::Encoding, message);
+            }
+            read_eds(&text, &mut findings)?
+        }
+        Format::Xdd => xdd::read(&text, &mut findings)?,
+    };
     let mut diagnostics = findings.0;
     diagnostics.sort_by_key(|diagnostic| diagnostic.line);
     let text = match text {
         Cow::Borrowed(text) => text.into(),
         Cow::Owned(text) => text,
     };
-    Ok(Reading { device, diagnostics, source: Source { format: Format::Eds, encoding, text } })
+    Ok(Reading { device, diagnostics, source: Source { format, encoding, text } })
 }
 
 fn read_eds(text: &str, findings: &mut Findings) -> Result<Device, ReadError> {

@@ -38,8 +38,13 @@ impl<'a> Builder<'a> {
         self.declared.insert(index, (section.line, counts.sub_number));
     }
 
+    /// Line of an object's own section; 0 where it has none.
+    pub(crate) fn line(&self, index: u16) -> u32 {
+        self.declared.get(&index).map_or(0, |(line, _)| *line)
+    }
+
     /// The objects, and entries of lists that belong to no sub-object.
-    pub(crate) fn finish(mut self, findings: &mut Findings) -> (Vec<Object>, Vec<Section>) {
+    pub(crate) fn finish(&mut self, findings: &mut Findings) -> (Vec<Object>, Vec<Section>) {
         let pending = core::mem::take(&mut self.pending);
         for (index, part, section) in &pending {
             if let Part::Sub(subindex) = *part {
@@ -68,7 +73,7 @@ impl<'a> Builder<'a> {
                 leftover.push(Section { name: section.name.to_owned(), fields: rest });
             }
         }
-        (self.objects.into_values().collect(), leftover)
+        (core::mem::take(&mut self.objects).into_values().collect(), leftover)
     }
 
     fn add_sub(&mut self, index: u16, subindex: u8, section: &Lines<'_>, findings: &mut Findings) {

@@ -68,7 +68,7 @@ pub(crate) fn read(document: &Document<'_>, findings: &mut Findings) -> Device {
     let (objects, leftover) = main.finish(findings);
     device.objects = objects;
     device.other.extend(leftover);
-    lists.apply(&mut device, findings);
+    lists.apply(&mut device, &main, findings);
     for (number, module) in modules {
         let (module, leftover) = module.finish(number, findings);
         device.modules.push(module);
@@ -236,7 +236,7 @@ impl Lists {
         }
     }
 
-    fn apply(mut self, device: &mut Device, findings: &mut Findings) {
+    fn apply(mut self, device: &mut Device, sections: &Builder<'_>, findings: &mut Findings) {
         for list in List::ALL {
             if !self.seen.contains(&list) {
                 findings.add(0, Rule::MissingSection, format!("section [{list}] is missing"));
@@ -252,7 +252,7 @@ impl Lists {
                         "{:04X}h is in none of the lists; taken as of [{}]",
                         object.index, object.list
                     );
-                    findings.add(0, Rule::List, message);
+                    findings.add(sections.line(object.index), Rule::List, message);
                 }
             }
         }
@@ -295,8 +295,10 @@ impl<'a> ModuleBuilder<'a> {
         let (fixed, mut leftover) = self.fixed.finish(findings);
         let (extends, more) = self.extends.finish(findings);
         leftover.extend(more);
-        for (list, objects, kind) in [(&self.lists[0], &fixed, "Fixed"), (&self.lists[1], &extends, "SubExt")]
-        {
+        for (list, builder, objects, kind) in [
+            (&self.lists[0], &self.fixed, &fixed, "Fixed"),
+            (&self.lists[1], &self.extends, &extends, "SubExt"),
+        ] {
             for &(line, index) in list {
                 if !objects.iter().any(|object| object.index == index) {
                     let message = format!("there is no section [M{number}{kind}{index:04X}]");
@@ -307,7 +309,7 @@ impl<'a> ModuleBuilder<'a> {
                 objects.iter().filter(|object| !list.iter().any(|(_, index)| *index == object.index))
             {
                 let message = format!("[M{number}{kind}{:04X}] is in no list", object.index);
-                findings.add(0, Rule::Modules, message);
+                findings.add(builder.line(object.index), Rule::Modules, message);
             }
         }
         self.module.number = number;

@@ -1,0 +1,120 @@
+//! XDD and XDC (CiA 311): what EDS and DCF say, as XML.
+//!
+//! An object's attributes may stand in its `CANopenObject` element or in the `parameter` that its
+//! `uniqueIDRef` names; the element has precedence. Names are compared without their namespace prefix,
+//! because generators disagree about which elements have one.
+
+mod reader;
+mod update;
+mod writer;
+
+use super::types::{Access, DataType};
+
+pub(crate) use reader::read;
+pub(crate) use update::update;
+pub use writer::write as write_xdd;
+
+/// How a value of a header is written in XML.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Kind {
+    /// As it is.
+    Text,
+    /// `true`, `false`; in an EDS 1, 0.
+    Bool,
+    /// `2023-03-17`; in an EDS 03-17-2023.
+    Date,
+    /// `16:49:28…`; in an EDS 04:49PM.
+    Time,
+    /// `500 Kbps`; in an EDS 500.
+    BitRate,
+}
+
+/// Attribute, key of the EDS, form.
+type Row = (&'static str, &'static str, Kind);
+
+/// Attributes of `ProfileBody` and their keys in `[FileInfo]`.
+const FILE_INFO: [Row; 8] = [
+    ("fileName", "FileName", Kind::Text),
+    ("fileCreator", "CreatedBy", Kind::Text),
+    ("fileCreationDate", "CreationDate", Kind::Date),
+    ("fileCreationTime", "CreationTime", Kind::Time),
+    ("fileModifiedBy", "ModifiedBy", Kind::Text),
+    ("fileModificationDate", "ModificationDate", Kind::Date),
+    ("fileModificationTime", "ModificationTime", Kind::Time),
+    ("fileVersion", "FileVersion", Kind::Text),
+];
+
+/// Elements of `DeviceIdentity` and their keys in `[DeviceInfo]`.
+const IDENTITY: [(&str, &str); 6] = [
+    ("vendorName", "VendorName"),
+    ("vendorID", "VendorNumber"),
+    ("productName", "ProductName"),
+    ("productID", "ProductNumber"),
+    ("orderNumber", "OrderCode"),
+    ("specificationRevision", "RevisionNumber"),
+];
+
+/// Attributes of `CANopenGeneralFeatures` and their keys in `[DeviceInfo]`.
+const GENERAL: [Row; 9] = [
+    ("groupMessaging", "GroupMessaging", Kind::Bool),
+    ("dynamicChannels", "DynamicChannelsSupported", Kind::Text),
+    ("selfStartingDevice", "SelfStartingDevice", Kind::Bool),
+    ("SDORequestingDevice", "SDORequestingDevice", Kind::Bool),
+    ("granularity", "Granularity", Kind::Text),
+    ("nrOfRxPDO", "NrOfRXPDO", Kind::Text),
+    ("nrOfTxPDO", "NrOfTXPDO", Kind::Text),
+    ("bootUpSlave", "SimpleBootUpSlave", Kind::Bool),
+    ("layerSettingServiceSlave", "LSS_Supported", Kind::Bool),
+];
+
+/// Attributes of `CANopenMasterFeatures` and their keys in `[DeviceInfo]`.
+const MASTER: [Row; 4] = [
+    ("bootUpMaster", "SimpleBootUpMaster", Kind::Bool),
+    ("flyingMaster", "FlyingMaster", Kind::Bool),
+    ("SDOManager", "SDOManager", Kind::Bool),
+    ("layerSettingServiceMaster", "LSS_Master", Kind::Bool),
+];
+
+/// Attributes of `deviceCommissioning` and their keys in `[DeviceComissioning]`.
+const COMMISSIONING: [Row; 6] = [
+    ("nodeID", "NodeID", Kind::Text),
+    ("nodeName", "NodeName", Kind::Text),
+    ("actualBaudRate", "Baudrate", Kind::BitRate),
+    ("networkNumber", "NetNumber", Kind::Text),
+    ("networkName", "NetworkName", Kind::Text),
+    ("CANopenManager", "CANopenManager", Kind::Bool),
+];
+
+/// Elements that name a simple type (CiA 311, table of IEC 61131-3 types). The first line of a type is
+/// the one that is written.
+const TYPES: [(&str, DataType); 19] = [
+    ("BOOL", DataType::BOOLEAN),
+    ("SINT", DataType::INTEGER8),
+    ("INT", DataType::INTEGER16),
+    ("DINT", DataType::INTEGER32),
+    ("LINT", DataType::INTEGER64),
+    ("USINT", DataType::UNSIGNED8),
+    ("UINT", DataType::UNSIGNED16),
+    ("UDINT", DataType::UNSIGNED32),
+    ("ULINT", DataType::UNSIGNED64),
+    ("REAL", DataType::REAL32),
+    ("LREAL", DataType::REAL64),
+    ("STRING", DataType::VISIBLE_STRING),
+    ("WSTRING", DataType::UNICODE_STRING),
+    ("BITSTRING", DataType::OCTET_STRING),
+    ("CHAR", DataType::INTEGER8),
+    ("BYTE", DataType::UNSIGNED8),
+    ("WORD", DataType::UNSIGNED16),
+    ("DWORD", DataType::UNSIGNED32),
+    ("LWORD", DataType::UNSIGNED64),
+];
+
+/// Words of a parameter's `access`.
+const ACCESS: [(&str, Access); 6] = [
+    ("const", Access::Const),
+    ("read", Access::ReadOnly),
+    ("write", Access::WriteOnly),
+    ("readWrite", Access::ReadWrite),
+    ("readWriteInput", Access::ReadWriteInput),
+    ("readWriteOutput", Access::ReadWriteOutput),
+];
