@@ -5,11 +5,19 @@ use core::fmt;
 use super::{Entry, RangeError, Values};
 
 /// A value as the device displays it: with its decimal point, or as the choice's text.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Formatted {
     entry: Entry,
     value: i32,
     decimals: u8,
+}
+
+impl Formatted {
+    /// The value in display units, without its point.
+    #[must_use]
+    pub const fn raw(&self) -> i32 {
+        self.value
+    }
 }
 
 impl fmt::Display for Formatted {
@@ -35,10 +43,12 @@ impl fmt::Display for Formatted {
 #[non_exhaustive]
 pub enum ValueError {
     /// Neither a number nor, for a characteristic, one of its choices.
-    #[error("{entry}: neither a number nor one of its choices")]
+    #[error("{entry}: {} expected", Expected { entry: *.entry, decimals: *.decimals })]
     NotANumber {
         /// The parameter.
         entry: Entry,
+        /// Digits after the point that its values have.
+        decimals: u8,
     },
     /// More digits after the point than the parameter has.
     #[error("{entry}: at most {decimals} digits after the decimal point")]
@@ -54,9 +64,38 @@ pub enum ValueError {
         /// The parameter.
         entry: Entry,
     },
-    /// A number that the parameter does not take.
+    /// Outside of the range.
+    #[error("{entry}: {value} is out of range, {} expected", Expected { entry: *.entry, decimals: value.decimals })]
+    Range {
+        /// The parameter.
+        entry: Entry,
+        /// The value given.
+        value: Formatted,
+    },
+    /// A choice that the parameter does not take.
     #[error(transparent)]
-    Range(#[from] RangeError),
+    Choice(#[from] RangeError),
+}
+
+/// What a parameter takes, in words.
+struct Expected {
+    entry: Entry,
+    decimals: u8,
+}
+
+impl fmt::Display for Expected {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { entry, decimals } = *self;
+        if entry.choices().is_empty() {
+            let bound = |value| Formatted { entry, value, decimals };
+            return write!(f, "{} to {}", bound(entry.minimum()), bound(entry.maximum()));
+        }
+        let allowed = entry.choices().iter().zip(0..).filter(|(_, value)| entry.allows(*value));
+        for (position, (choice, _)) in allowed.enumerate() {
+            write!(f, "{}{:?}", if position == 0 { "" } else { ", " }, choice.text)?;
+        }
+        Ok(())
+    }
 }
 
 impl Entry {
@@ -90,12 +129,12 @@ impl Entry {
         } else if (self.minimum()..=self.maximum()).contains(&value) {
             Err(RangeError::Choice { entry: *self, value }.into())
         } else {
-            Err(RangeError::Range { entry: *self, value }.into())
+            Err(ValueError::Range { entry: *self, value: self.format(value, values) })
         }
     }
 
     fn number(&self, text: &str, decimals: u8) -> Result<i32, ValueError> {
-        let wrong = ValueError::NotANumber { entry: *self };
+        let wrong = ValueError::NotANumber { entry: *self, decimals };
         let (negative, digits) = match text.strip_prefix('-') {
             Some(digits) => (true, digits),
             None => (false, text.strip_prefix('+').unwrap_or(text)),
@@ -159,10 +198,15 @@ mod tests {
             say(654, "0.0005"),
             "[654] t max. acceleration, Axis 1: at most 3 digits after the decimal point"
         );
-        assert_eq!(say(642, "fast"), "[642] V max., Axis 1: neither a number nor one of its choices");
-        assert_eq!(say(642, ""), "[642] V max., Axis 1: neither a number nor one of its choices");
+        assert_eq!(say(642, "fast"), "[642] V max., Axis 1: 0 to 3276800 expected");
+        assert_eq!(say(642, ""), "[642] V max., Axis 1: 0 to 3276800 expected");
+        assert_eq!(
+            say(654, "70"),
+            "[654] t max. acceleration, Axis 1: 70.000 is out of range, 0.000 to 9.999 expected"
+        );
+        assert_eq!(say(108, "on"), "[108] State, Actual value input 2: \"Inactive\", \"Active\" expected");
         assert_eq!(say(642, "99999999999999999999"), "[642] V max., Axis 1: the number is too large");
-        assert_eq!(say(642, "5-3"), "[642] V max., Axis 1: neither a number nor one of its choices");
+        assert_eq!(say(642, "5-3"), "[642] V max., Axis 1: 0 to 3276800 expected");
         assert_eq!(
             say(103, "incremental"),
             "[103] Type, Actual value input 4: choice 0 cannot be selected here"

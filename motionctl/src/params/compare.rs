@@ -73,5 +73,9 @@ pub(crate) fn run(out: &Output, here: &Backup, there: &Backup) -> Result<(), Exi
         lines.iter().for_each(|line| println!("{line}"));
         println!("{counts}");
     });
-    if same { Ok(()) } else { Err(Exit::check(format!("{count} differences"))) }
+    if same {
+        Ok(())
+    } else {
+        Err(Exit::check(format!("{count} difference{}", if count == 1 { "" } else { "s" })))
+    }
 }

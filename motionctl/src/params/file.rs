@@ -5,7 +5,7 @@ use core::fmt::Write as _;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use motion_core::parameters::{Entry, Values, get, iter};
+use motion_core::parameters::{Entry, RangeError, ValueError, Values, get, iter};
 use toml_edit::{Document, Item};
 
 use crate::exit::Exit;
@@ -194,11 +194,8 @@ fn value(text: &str, entry: Entry, item: &Item, display: &Values) -> Result<i32,
     let parsed = match entry.parse(written, display) {
         Ok(parsed) => parsed,
         // Values out of range are kept, for `compare` to name them and `restore` to refuse them.
-        Err(motion_core::parameters::ValueError::Range(error)) => match error {
-            motion_core::parameters::RangeError::Range { value, .. }
-            | motion_core::parameters::RangeError::Choice { value, .. } => value,
-            error => return Err(fault(error.to_string())),
-        },
+        Err(ValueError::Range { value, .. }) => value.raw(),
+        Err(ValueError::Choice(RangeError::Choice { value, .. })) => value,
         Err(error) => return Err(fault(error.to_string())),
     };
     if let (Some(said), Some(choice)) =
