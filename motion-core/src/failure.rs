@@ -1,9 +1,11 @@
-//! Failure numbers that manual A does not name, for what its operating system watches all the same.
+//! The list of stored failures (manual A 4.3.4.2), and failure numbers that the manual does not name,
+//! for what its operating system watches all the same.
 //!
-//! All are project-defined; they go into the same list as the manual's own (4.3.4.2) and are read over
-//! LB2 50h. A limit switch has the number of the error code that it gives a motion command (6.8.1.1).
+//! These are all project-defined; they go into the same list as the manual's own and are read over LB2
+//! 50h. A limit switch has the number of the error code that it gives a motion command (6.8.1.1).
 
-use lb2::code::Failure;
+use lb2::code::{Failure, StoredFailure};
+use lb2::telegram::MAX_FAILURES;
 
 /// Upper software limit `[930]` passed.
 pub const SW_LIMIT_PLUS: Failure = Failure(0x04);
@@ -35,6 +37,44 @@ pub const fn text(failure: Failure) -> Option<&'static str> {
         DRIVE_LOST => Some("drive lost on the CAN bus"),
         DRIVE_FAULT => Some("drive reports a fault"),
         other => other.text(),
+    }
+}
+
+/// The list of up to 20 failures; of more, the oldest is dropped (project-defined).
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FailureLog {
+    stored: [StoredFailure; MAX_FAILURES],
+    count: usize,
+}
+
+impl Default for FailureLog {
+    fn default() -> Self {
+        Self { stored: [StoredFailure { axis: 0, failure: Failure(0) }; MAX_FAILURES], count: 0 }
+    }
+}
+
+impl FailureLog {
+    /// The failures, oldest first.
+    #[must_use]
+    pub fn stored(&self) -> &[StoredFailure] {
+        self.stored.get(..self.count).unwrap_or(&[])
+    }
+
+    /// Adds one.
+    pub fn store(&mut self, failure: StoredFailure) {
+        if self.count == MAX_FAILURES {
+            self.stored.rotate_left(1);
+            self.count -= 1;
+        }
+        if let Some(slot) = self.stored.get_mut(self.count) {
+            *slot = failure;
+            self.count += 1;
+        }
+    }
+
+    /// Deletes all; how many there were.
+    pub const fn clear(&mut self) -> usize {
+        core::mem::replace(&mut self.count, 0)
     }
 }
 

@@ -4,6 +4,9 @@ use core::time::Duration;
 
 use lb2::code::{ErrorCode, Failure, LoaderCode, StoredFailure};
 use lb2::device::Device;
+use motion_core::application::Plc;
+use motion_core::control::DriveInputs;
+use motion_core::io::{Inputs, Terminal};
 use motion_core::parameters::{Values, iter};
 use motion_core::storage::{Storage, StorageError};
 use motion_core::{Controller, Model, Reset, ResetError, STORAGE_LEN};
@@ -228,4 +231,53 @@ fn a_save_is_safe_against_power_failure() {
     }
     // One commit byte, 2424 bytes of values, sequence, check sum: the commit byte is the last of 2434.
     assert_eq!((old, new), (2434, 4001 - 2434));
+}
+
+/// 6.6.1.1, `[247]`: the internal offset of an input "is stored safe against power failures".
+#[test]
+fn a_set_position_survives_the_loss_of_power() {
+    let mut controller = new();
+    let mut inputs = Inputs::default();
+    inputs.digital.set(Terminal::PLC_RUN, true);
+    inputs.encoders[0].count = 500;
+    let mut application =
+        |plc: &mut Plc<'_>| plc.axis(1).and_then(|axis| axis.set_position(70)).unwrap_or_default();
+    controller.cycle(&inputs, &DriveInputs::default(), &mut application);
+    controller.cycle(&inputs, &DriveInputs::default(), &mut ());
+    assert_eq!(controller.actual_values()[0].position, 70);
+    controller.advance(Duration::from_millis(3)).unwrap();
+    let mut controller = on(controller.power_off());
+    controller.cycle(&inputs, &DriveInputs::default(), &mut ());
+    assert_eq!(controller.actual_values()[0].position, 70);
+    // Another type of input sets it back.
+    for kind in [1, 0] {
+        controller.write_parameter(100, kind);
+        controller.call_loader();
+    }
+    controller.cycle(&inputs, &DriveInputs::default(), &mut ());
+    assert_eq!(controller.actual_values()[0].position, 500);
+}
+
+/// An encoder failure is in the list in the same cycle, with its axis, as LB2 50h shows it.
+#[test]
+fn an_encoder_failure_is_stored_in_the_same_cycle() {
+    let mut controller = new();
+    let mut inputs = Inputs::default();
+    controller.cycle(&inputs, &DriveInputs::default(), &mut ());
+    assert_eq!(controller.failure_count(), 0);
+    inputs.encoders[1].fault = true;
+    controller.cycle(&inputs, &DriveInputs::default(), &mut ());
+    let stored = StoredFailure { axis: 2, failure: motion_core::failure::READING_LOST };
+    assert_eq!((controller.failure_count(), controller.failure(0)), (1, Some(stored)));
+}
+
+/// `[000]`: 1 ms an activated axis, changed by the loader while running.
+#[test]
+fn the_cycle_follows_the_loader() {
+    let mut controller = new();
+    assert_eq!(controller.cycle_time(), Duration::from_millis(3));
+    controller.write_parameter(0, 5);
+    assert_eq!(controller.cycle_time(), Duration::from_millis(3));
+    controller.call_loader();
+    assert_eq!(controller.cycle_time(), Duration::from_millis(5));
 }
