@@ -3,13 +3,12 @@
 //! All are little-endian on the wire.
 
 mod scalar;
-mod time;
 mod value;
 
 use core::fmt;
 
+pub use crate::time::TimeOfDay;
 pub use scalar::{LengthError, Scalar};
-pub use time::{TimeDifference, TimeOfDay};
 pub use value::{Value, ValueError};
 
 /// Code of a data type: the index of its entry in the object dictionary, 0001h…025Fh.

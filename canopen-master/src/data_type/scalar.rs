@@ -1,6 +1,6 @@
 //! Scalars as Rust types.
 
-use super::{DataType, TimeDifference, TimeOfDay};
+use super::{DataType, TimeOfDay};
 use crate::sdo::Small;
 
 /// Another number of bytes than the type has.
@@ -83,23 +83,11 @@ impl Scalar for TimeOfDay {
     const TYPE: DataType = DataType::TIME_OF_DAY;
 
     fn from_bytes(bytes: &[u8]) -> Result<Self, LengthError> {
-        exactly(Self::TYPE, bytes).map(Self::from_wire)
+        exactly(Self::TYPE, bytes).map(Self::parse)
     }
 
     fn to_small(self) -> Small {
-        Small::new(&self.to_wire()).unwrap_or(Small::EMPTY)
-    }
-}
-
-impl Scalar for TimeDifference {
-    const TYPE: DataType = DataType::TIME_DIFFERENCE;
-
-    fn from_bytes(bytes: &[u8]) -> Result<Self, LengthError> {
-        exactly(Self::TYPE, bytes).map(Self::from_wire)
-    }
-
-    fn to_small(self) -> Small {
-        Small::new(&self.to_wire()).unwrap_or(Small::EMPTY)
+        Small::new(&self.encode()).unwrap_or(Small::EMPTY)
     }
 }
 

@@ -9,6 +9,7 @@
 //! to tell them apart (see [`Client`] for what is done about it).
 
 mod abort;
+mod block;
 mod buffer;
 mod client;
 pub mod message;
@@ -20,8 +21,9 @@ use pdo::NodeId;
 use pdo::cob::{SDO_REQUEST, SDO_RESPONSE};
 
 pub use abort::AbortCode;
+pub use block::MAX_BLOCK_SIZE;
 pub use buffer::{Buffer, Either, Small};
-pub use client::{ANSWER, Client, Fault, Finished, Options, Outcome, Refused, SubmitError, Ticket};
+pub use client::{ANSWER, Block, Client, Fault, Finished, Options, Outcome, Refused, SubmitError, Ticket};
 pub use pdo::Address;
 pub use server::{Access, NEXT_REQUEST, Piece, Server, Total, read_slice};
 

@@ -9,7 +9,7 @@ use super::pair::ms;
 
 const CHANNEL: Channel = Channel { request: 0x601, response: 0x581 };
 const STATUS: Address = Address::new(0x6041, 0);
-const OPTIONS: Options = Options { timeout: ms(50) };
+const OPTIONS: Options = Options::new(ms(50));
 
 /// A conversation as a script.
 struct Script<B> {

@@ -91,6 +91,11 @@ impl Pair {
     pub(crate) fn run(&mut self) -> Finished<Vec<u8>> {
         for _ in 0..1_000_000 {
             if let Some(finished) = self.client.poll_event() {
+                // The last word still goes out.
+                while let Some(frame) = self.client.poll_transmit(self.now) {
+                    self.log.push(frame);
+                    self.server.handle_frame(self.now, &frame, &mut self.objects);
+                }
                 return finished;
             }
             let mut moved = false;

@@ -1,5 +1,6 @@
 //! The client: one transfer at a time on one channel, each with exactly one outcome.
 
+mod block;
 mod outcome;
 mod segmented;
 
@@ -7,8 +8,10 @@ use core::time::Duration;
 
 use pdo::{Frame, Handled};
 
-use super::message::{ABORT, Request, Response};
+use super::block::{Receiver, Sender};
+use super::message::{ABORT, Request, Response, SEGMENT};
 use super::{AbortCode, Address, Buffer, Channel, data_on};
+pub use block::Block;
 pub use outcome::{Fault, Finished, Outcome, Refused, SubmitError, Ticket};
 
 /// Time that a server has for each answer, unless set (CiA 301 names none).
@@ -19,11 +22,27 @@ pub const ANSWER: Duration = Duration::from_millis(500);
 pub struct Options {
     /// Longest time from a request to its answer; not the time of the whole transfer.
     pub timeout: Duration,
+    /// In blocks; `None`: expedited or in segments.
+    pub block: Option<Block>,
+}
+
+impl Options {
+    /// Expedited or in segments.
+    #[must_use]
+    pub const fn new(timeout: Duration) -> Self {
+        Self { timeout, block: None }
+    }
+
+    /// In blocks with CRC.
+    #[must_use]
+    pub fn block(timeout: Duration) -> Self {
+        Self { timeout, block: Some(Block::default()) }
+    }
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { timeout: ANSWER }
+        Self::new(ANSWER)
     }
 }
 
@@ -46,6 +65,24 @@ enum State {
         sent: u8,
         last: bool,
     },
+    /// As `UploadBegun`, in blocks, or plain up to a threshold as the server likes.
+    BlockUploadBegun {
+        threshold: u8,
+    },
+    /// Segments of a sub-block come in.
+    BlockReceive,
+    /// All segments have come; the server's last word is awaited.
+    BlockUploadEnd,
+    /// As `DownloadBegun`, in blocks. A CRC was offered or not.
+    BlockDownloadBegun {
+        crc: bool,
+    },
+    /// Segments of a sub-block are to be sent.
+    BlockSend,
+    /// A sub-block is to be confirmed.
+    BlockConfirm,
+    /// The end is to be confirmed.
+    BlockDownloadEnd,
     /// The outcome waits to be polled.
     Ended(Outcome),
 }
@@ -87,7 +124,14 @@ pub struct Client<B> {
     /// Bytes in all, if known.
     size: Option<u32>,
     tx: Option<[u8; 8]>,
-    abort: Option<[u8; 8]>,
+    /// The last word on a transfer that has ended.
+    parting: Option<[u8; 8]>,
+    sender: Sender,
+    receiver: Receiver,
+    /// Block download: a CRC was agreed on.
+    check: bool,
+    /// Block upload: the last segment, of which maybe not all bytes count.
+    held: Option<[u8; SEGMENT]>,
     outstanding: Option<Outstanding>,
     ticket: u32,
     strays: u32,
@@ -107,7 +151,11 @@ impl<B: Buffer> Client<B> {
             offset: 0,
             size: None,
             tx: None,
-            abort: None,
+            parting: None,
+            sender: Sender::EMPTY,
+            receiver: Receiver::EMPTY,
+            check: false,
+            held: None,
             outstanding: None,
             ticket: 0,
             strays: 0,
@@ -148,8 +196,12 @@ impl<B: Buffer> Client<B> {
             return Err(Refused { error: SubmitError::Busy, buffer });
         }
         self.size = None;
-        self.tx = Some(Request::InitiateUpload { at }.encode());
-        self.state = State::UploadBegun;
+        if let Some(block) = &options.block {
+            self.begin_block_upload(at, block);
+        } else {
+            self.tx = Some(Request::InitiateUpload { at }.encode());
+            self.state = State::UploadBegun;
+        }
         Ok(self.begin(at, buffer, options))
     }
 
@@ -164,6 +216,12 @@ impl<B: Buffer> Client<B> {
             return Err(Refused { error: SubmitError::Busy, buffer });
         }
         self.size = buffer.size();
+        if let Some(block) = &options.block
+            && self.size.is_none_or(|size| size > u32::from(block.threshold))
+        {
+            self.begin_block_download(at, block, self.size);
+            return Ok(self.begin(at, buffer, options));
+        }
         let begun = segmented::begin_download(at, &mut buffer, self.size);
         let (tx, sent) = match begun {
             Ok(begun) => begun,
@@ -213,6 +271,9 @@ impl<B: Buffer> Client<B> {
             self.outstanding = None;
         }
         let Some(deadline) = self.deadline.filter(|&deadline| now >= deadline) else { return };
+        if self.ask_again() {
+            return;
+        }
         self.expect_late(Some(deadline.saturating_add(self.timeout)));
         self.finish(Outcome::TimedOut);
         self.send_abort(AbortCode::TIMED_OUT);
@@ -231,16 +292,25 @@ impl<B: Buffer> Client<B> {
     /// The frame to send now, once.
     #[inline]
     pub fn poll_transmit(&mut self, now: Duration) -> Option<Frame> {
-        if let Some(abort) = self.abort.take() {
-            return Some(Frame::standard(self.channel.request, abort));
+        if self.parting.is_some() {
+            return self.parting_frame();
         }
-        let tx = self.tx?;
+        let Some(tx) = self.tx else {
+            if self.state == State::BlockSend {
+                return self.next_block_segment(now).or_else(|| self.parting_frame());
+            }
+            return None;
+        };
         if self.held_back_until().is_some_and(|until| now < until) {
             return None;
         }
         self.tx = None;
         self.deadline = Some(now.saturating_add(self.timeout));
         Some(Frame::standard(self.channel.request, tx))
+    }
+
+    fn parting_frame(&mut self) -> Option<Frame> {
+        self.parting.take().map(|parting| Frame::standard(self.channel.request, parting))
     }
 
     /// The outcome of the transfer and its buffer, once.
@@ -253,11 +323,14 @@ impl<B: Buffer> Client<B> {
     }
 
     #[inline]
-    fn handle_data(&mut self, _now: Duration, data: &[u8]) {
+    fn handle_data(&mut self, now: Duration, data: &[u8]) {
         // With our next request still to be sent, nothing but an abort of what was begun makes sense.
         let asked = self.tx.is_none() || (!self.is_beginning() && data.first() == Some(&ABORT));
         if !asked || matches!(self.state, State::Idle | State::Ended(_)) {
             return self.stray(data);
+        }
+        if self.state == State::BlockReceive {
+            return self.on_block_frame(now, data);
         }
         let response = match Response::parse(data) {
             Ok(response) => response,
@@ -282,6 +355,27 @@ impl<B: Buffer> Client<B> {
             ) => {
                 self.on_download_segment(expected, toggle, sent, last);
             }
+            (Response::InitiateUpload { at, content }, State::BlockUploadBegun { threshold })
+                if at == self.at =>
+            {
+                self.on_protocol_switch(content, threshold, data);
+            }
+            (Response::InitiateBlockUpload { at, crc, size }, State::BlockUploadBegun { .. })
+                if at == self.at =>
+            {
+                self.on_block_upload_begun(crc, size);
+            }
+            (Response::EndBlockUpload { unused, crc }, State::BlockUploadEnd) => {
+                self.on_block_upload_end(unused, crc);
+            }
+            (
+                Response::InitiateBlockDownload { at, crc, block_size },
+                State::BlockDownloadBegun { crc: offered },
+            ) if at == self.at => self.on_block_download_begun(offered, crc, block_size),
+            (Response::AckBlockDownload { sequence, block_size }, State::BlockSend | State::BlockConfirm) => {
+                self.on_block_confirmed(sequence, block_size);
+            }
+            (Response::EndBlockDownload, State::BlockDownloadEnd) => self.finish(Outcome::Done(self.offset)),
             _ if self.is_beginning() => self.stray(data),
             _ => self.give_up(Fault::Unexpected { command: data.first().copied().unwrap_or(0) }),
         }
@@ -299,7 +393,13 @@ impl<B: Buffer> Client<B> {
     }
 
     const fn is_beginning(&self) -> bool {
-        matches!(self.state, State::UploadBegun | State::DownloadBegun { .. })
+        matches!(
+            self.state,
+            State::UploadBegun
+                | State::DownloadBegun { .. }
+                | State::BlockUploadBegun { .. }
+                | State::BlockDownloadBegun { .. }
+        )
     }
 
     /// Whether the request that is ready to go waits for an old answer.
@@ -307,8 +407,8 @@ impl<B: Buffer> Client<B> {
     fn held_back_until(&self) -> Option<Duration> {
         let outstanding = self.outstanding?;
         let upload = match self.state {
-            State::UploadBegun => true,
-            State::DownloadBegun { .. } => false,
+            State::UploadBegun | State::BlockUploadBegun { .. } => true,
+            State::DownloadBegun { .. } | State::BlockDownloadBegun { .. } => false,
             _ => return None,
         };
         (outstanding.upload == upload && outstanding.at == self.at).then_some(outstanding.until)
@@ -317,7 +417,7 @@ impl<B: Buffer> Client<B> {
     /// A first answer may come too late from now on.
     fn expect_late(&mut self, until: Option<Duration>) {
         if let Some(until) = until.filter(|_| self.is_beginning() && self.tx.is_none()) {
-            let upload = matches!(self.state, State::UploadBegun);
+            let upload = matches!(self.state, State::UploadBegun | State::BlockUploadBegun { .. });
             self.outstanding = Some(Outstanding { upload, at: self.at, until });
         }
     }
@@ -327,8 +427,12 @@ impl<B: Buffer> Client<B> {
         self.strays = self.strays.saturating_add(1);
         let Some(outstanding) = self.outstanding else { return };
         let answers = match Response::parse(data) {
-            Ok(Response::InitiateUpload { at, .. }) => outstanding.upload && at == outstanding.at,
-            Ok(Response::InitiateDownload { at }) => !outstanding.upload && at == outstanding.at,
+            Ok(Response::InitiateUpload { at, .. } | Response::InitiateBlockUpload { at, .. }) => {
+                outstanding.upload && at == outstanding.at
+            }
+            Ok(Response::InitiateDownload { at } | Response::InitiateBlockDownload { at, .. }) => {
+                !outstanding.upload && at == outstanding.at
+            }
             Ok(Response::Abort { at, .. }) => at == outstanding.at,
             _ => false,
         };
@@ -351,7 +455,7 @@ impl<B: Buffer> Client<B> {
     }
 
     fn send_abort(&mut self, code: AbortCode) {
-        self.abort = Some(Request::Abort { at: self.at, code }.encode());
+        self.parting = Some(Request::Abort { at: self.at, code }.encode());
     }
 
     #[cold]

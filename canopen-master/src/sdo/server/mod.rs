@@ -1,12 +1,14 @@
 //! The server: answers one client on one channel from an [`Access`].
 
 mod access;
+mod block;
 mod segmented;
 
 use core::time::Duration;
 
 use pdo::{Frame, Handled};
 
+use super::block::{MAX_BLOCK_SIZE, Receiver, Sender, is_block_size};
 use super::message::{Request, Response};
 use super::{AbortCode, Address, Channel, data_on};
 pub use access::{Access, Piece, Total, read_slice};
@@ -29,6 +31,18 @@ enum State {
     Download {
         toggle: bool,
     },
+    /// Segments of a sub-block come in.
+    BlockReceive,
+    /// All segments have come; the client's last word is awaited.
+    BlockDownloadEnd,
+    /// The client is to say that it is ready.
+    BlockUploadBegun,
+    /// Segments of a sub-block are to be sent.
+    BlockSend,
+    /// A sub-block is to be confirmed.
+    BlockConfirm,
+    /// The end is to be confirmed.
+    BlockUploadEnd,
 }
 
 /// An SDO server on one channel.
@@ -54,6 +68,11 @@ pub struct Server {
     held: [u8; HELD],
     held_len: u8,
     tx: Option<[u8; 8]>,
+    block_size: u8,
+    sender: Sender,
+    receiver: Receiver,
+    /// Block upload: the client wants a CRC.
+    check: bool,
 }
 
 impl Server {
@@ -71,7 +90,19 @@ impl Server {
             held: [0; HELD],
             held_len: 0,
             tx: None,
+            block_size: MAX_BLOCK_SIZE,
+            sender: Sender::EMPTY,
+            receiver: Receiver::EMPTY,
+            check: false,
         }
+    }
+
+    /// The same with so many segments per sub-block of a download, 1…127; another number becomes 127.
+    /// Fewer suit a receiver that can miss frames.
+    #[must_use]
+    pub const fn with_block_size(mut self, block_size: u8) -> Self {
+        self.block_size = if is_block_size(block_size) { block_size } else { MAX_BLOCK_SIZE };
+        self
     }
 
     /// Its identifiers.
@@ -109,7 +140,7 @@ impl Server {
 
     /// Gives up a transfer whose client is silent; early calls do nothing.
     pub fn handle_timeout(&mut self, now: Duration, objects: &mut impl Access) {
-        if self.deadline.is_some_and(|deadline| now >= deadline) {
+        if self.deadline.is_some_and(|deadline| now >= deadline) && !self.ask_again(now, objects) {
             self.abort(AbortCode::TIMED_OUT, objects);
         }
     }
@@ -123,13 +154,18 @@ impl Server {
 
     /// The frame to send now, once.
     #[inline]
-    pub fn poll_transmit(&mut self, _now: Duration, objects: &mut impl Access) -> Option<Frame> {
-        let _ = objects;
-        self.tx.take().map(|tx| Frame::standard(self.channel.response, tx))
+    pub fn poll_transmit(&mut self, now: Duration, objects: &mut impl Access) -> Option<Frame> {
+        if let Some(tx) = self.tx.take() {
+            return Some(Frame::standard(self.channel.response, tx));
+        }
+        if self.state == State::BlockSend { self.next_block_segment(now, objects) } else { None }
     }
 
     #[inline]
     fn handle_data(&mut self, now: Duration, data: &[u8], objects: &mut impl Access) {
+        if self.state == State::BlockReceive {
+            return self.on_block_frame(now, data, objects);
+        }
         let request = match Request::parse(data) {
             Ok(request) => request,
             Err(_) => {
@@ -151,6 +187,37 @@ impl Server {
             }
             (Request::DownloadSegment { toggle, last, data }, State::Download { toggle: expected }) => {
                 self.download_segment(expected, toggle, last, data.as_slice(), objects)
+            }
+            (Request::InitiateBlockUpload { at, crc, block_size, threshold }, _) => {
+                self.begin(at, objects);
+                self.begin_block_upload(crc, block_size, threshold, objects)
+            }
+            (Request::InitiateBlockDownload { at, crc, size }, _) => {
+                self.begin(at, objects);
+                self.begin_block_download(crc, size, objects)
+            }
+            (Request::EndBlockDownload { unused, crc }, State::BlockDownloadEnd) => {
+                self.end_block_download(unused, crc, objects)
+            }
+            (Request::StartBlockUpload, State::BlockUploadBegun) => {
+                self.state = State::BlockSend;
+                self.deadline = None;
+                return;
+            }
+            (Request::AckBlockUpload { sequence, block_size }, State::BlockSend | State::BlockConfirm) => {
+                match self.on_block_confirmed(sequence, block_size) {
+                    Ok(Some(response)) => Ok(response),
+                    Ok(None) => {
+                        self.deadline = None;
+                        return;
+                    }
+                    Err(code) => Err(code),
+                }
+            }
+            (Request::EndBlockUpload, State::BlockUploadEnd) => {
+                self.state = State::Idle;
+                self.deadline = None;
+                return;
             }
             (Request::Abort { .. }, _) => return self.replace(objects),
             _ => {
@@ -180,7 +247,7 @@ impl Server {
 
     /// Leaves the transfer under way.
     fn replace(&mut self, objects: &mut impl Access) {
-        if matches!(self.state, State::Download { .. }) {
+        if matches!(self.state, State::Download { .. } | State::BlockReceive | State::BlockDownloadEnd) {
             objects.abandon(self.at);
         }
         self.state = State::Idle;

@@ -10,7 +10,7 @@ const WHOLE: usize = 8;
 impl Server {
     /// Reads the beginning of the object, all of it if it is short.
     #[inline]
-    pub(super) fn load(&mut self, objects: &mut impl Access) -> Result<(), AbortCode> {
+    pub(super) fn load(&mut self, objects: &mut impl Access) -> Result<Option<u32>, AbortCode> {
         let mut first = [0; WHOLE];
         let (len, total) = objects.read(self.at, 0, &mut first)?;
         // Less than there was room for is all there is.
@@ -21,7 +21,7 @@ impl Server {
             }
             self.held_len = len as u8;
         }
-        Ok(())
+        Ok(self.size)
     }
 
     /// Whether the object of an upload was short enough to be read as a whole.
@@ -33,6 +33,12 @@ impl Server {
     #[inline]
     pub(super) fn begin_upload(&mut self, objects: &mut impl Access) -> Result<Response, AbortCode> {
         self.load(objects)?;
+        Ok(self.answer_upload())
+    }
+
+    /// The answer that begins an upload: the object itself if it is short.
+    #[inline]
+    pub(super) fn answer_upload(&mut self) -> Response {
         let content = match self.size {
             Some(1..=4) => Content::Expedited(Bytes::new(self.held()).unwrap_or(Bytes::EMPTY)),
             size => {
@@ -40,7 +46,7 @@ impl Server {
                 Content::Segmented(size)
             }
         };
-        Ok(Response::InitiateUpload { at: self.at, content })
+        Response::InitiateUpload { at: self.at, content }
     }
 
     #[inline]
