@@ -3,11 +3,14 @@
 //! [`read`] takes the bytes of a file, whatever its format and encoding, and gives a [`Device`]: the
 //! objects with data type, access, limits, default, configured value, and everything else the file
 //! says. Reading is lenient: what can be understood is, and every doubt is a [`Diagnostic`] with its
-//! line. [`Reading::update`] writes a changed device back into its file, leaving every line as it
+//! line; [`check`] adds every violation of the standard. [`Reading::update`] writes a changed device back into its file, leaving every line as it
 //! stands that the change does not concern; [`write_eds`] writes a file anew.
 //!
 //! Clauses are those of CiA 306-1 version 1.4, CiA 301 version 4.2 and CiA 311.
 
+mod check;
+mod compact_pdo;
+mod concise;
 mod diagnostic;
 mod encoding;
 pub mod ini;
@@ -24,6 +27,8 @@ use alloc::borrow::Cow;
 use alloc::string::String;
 use alloc::vec::Vec;
 
+pub use check::check;
+pub use concise::{ConciseEntry, ConciseError, ConciseValueError, encode_concise, parse_concise};
 pub use diagnostic::{Diagnostic, Rule, Severity};
 pub use encoding::Encoding;
 pub use model::{Device, Entry, Fields, Module, Object, Section};

@@ -10,7 +10,7 @@ mod writer;
 
 use super::types::{Access, DataType};
 
-pub(crate) use reader::read;
+pub(crate) use reader::{lines, read};
 pub(crate) use update::update;
 pub use writer::write as write_xdd;
 

@@ -103,6 +103,27 @@ pub(crate) fn read(text: &str, findings: &mut Findings) -> Result<Device, ReadEr
     Ok(device)
 }
 
+/// Lines of the elements of objects and sub-objects.
+pub(crate) fn lines(text: &str) -> BTreeMap<(u16, Option<u8>), u32> {
+    let Ok(document) = Document::parse(text) else { return BTreeMap::new() };
+    let lines = LineIndex::new(text);
+    let mut places = BTreeMap::new();
+    for node in document.descendants() {
+        if is(node, "CANopenObject") {
+            if let Some(index) = hex_attribute(node, "index") {
+                places.insert((index, None), lines.line(node));
+            }
+        } else if is(node, "CANopenSubObject") {
+            let index = node.parent().and_then(|parent| hex_attribute(parent, "index"));
+            let subindex = hex_attribute(node, "subIndex").and_then(|sub| u8::try_from(sub).ok());
+            if let (Some(index), Some(subindex)) = (index, subindex) {
+                places.insert((index, Some(subindex)), lines.line(node));
+            }
+        }
+    }
+    places
+}
+
 fn header(container: Node<'_, '_>, device: &mut Device, context: &Context<'_, '_>, findings: &mut Findings) {
     let line = |node| context.lines.line(node);
     for node in container.descendants().filter(Node::is_element) {

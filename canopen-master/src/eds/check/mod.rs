@@ -1,0 +1,217 @@
+//! Every violation of CiA 306-1 that reading alone does not show: `check`.
+
+mod header;
+mod objects;
+mod pdo;
+
+use alloc::collections::BTreeMap;
+use alloc::string::String;
+use alloc::vec::Vec;
+
+use super::diagnostic::{Diagnostic, Rule};
+use super::ini::{Document, LineKind, Section};
+use super::model::Device;
+use super::name::{Name, Part};
+use super::reader::Findings;
+use super::{Format, Reading, xdd};
+
+/// What reading found, and every other violation of the standard, by line.
+#[must_use]
+pub fn check(reading: &Reading) -> Vec<Diagnostic> {
+    let mut findings = Findings(reading.diagnostics.clone());
+    let device = &reading.device;
+    let text = reading.source.text.as_str();
+    match reading.source.format {
+        Format::Eds => {
+            let document = Document::parse(text);
+            layout(&document, &mut findings);
+            let places = Places::of_document(&document);
+            header::check(device, &places, &mut findings);
+            header::check_commissioning(device, &places, &mut findings);
+            contents(device, &places, &mut findings);
+        }
+        Format::Xdd => {
+            let places = Places { lines: xdd::lines(text), ..Places::default() };
+            header::check_commissioning(device, &places, &mut findings);
+            contents(device, &places, &mut findings);
+        }
+    }
+    let mut diagnostics = findings.0;
+    diagnostics.sort_by_key(|diagnostic| diagnostic.line);
+    diagnostics
+}
+
+fn contents(device: &Device, places: &Places<'_>, findings: &mut Findings) {
+    objects::check(device, places, findings);
+    pdo::check(device, places, findings);
+}
+
+/// Where things stand in the file.
+#[derive(Default)]
+struct Places<'a> {
+    /// Line of the section or element of an object (`None`) or sub-object.
+    lines: BTreeMap<(u16, Option<u8>), u32>,
+    /// The section itself, where the file has sections.
+    sections: BTreeMap<(u16, Option<u8>), &'a Section<'a>>,
+    /// Sections that are no objects, by upper-case name.
+    named: BTreeMap<String, &'a Section<'a>>,
+}
+
+impl<'a> Places<'a> {
+    fn of_document(document: &'a Document<'a>) -> Self {
+        let mut places = Self::default();
+        for section in document.sections.iter().filter(|section| section.line != 0) {
+            let key = match Name::parse(section.name) {
+                Name::Object(index, Part::Own) => (index, None),
+                Name::Object(index, Part::Sub(subindex)) => (index, Some(subindex)),
+                Name::Commissioning(_) => {
+                    places.named.insert("DEVICECOMISSIONING".into(), section);
+                    continue;
+                }
+                _ => {
+                    places.named.insert(section.name.to_ascii_uppercase(), section);
+                    continue;
+                }
+            };
+            places.lines.insert(key, section.line);
+            places.sections.insert(key, section);
+        }
+        places
+    }
+
+    /// Line of a key of an object or sub-object; of its section where it has no such key; of the
+    /// object where the sub-object has no section of its own.
+    fn line(&self, index: u16, subindex: Option<u8>, key: &str) -> u32 {
+        let keys = [(index, subindex), (index, None)];
+        let section = keys.iter().find_map(|at| self.sections.get(at));
+        let line = section.and_then(|section| section.entry(key)).map(|(line, _)| line);
+        line.or_else(|| keys.iter().find_map(|at| self.lines.get(at).copied())).unwrap_or_default()
+    }
+
+    /// Line of a key of another section, or of the section.
+    fn named_line(&self, section: &str, key: &str) -> u32 {
+        let Some(section) = self.named.get(&section.to_ascii_uppercase()) else { return 0 };
+        section.entry(key).map_or(section.line, |(line, _)| line)
+    }
+}
+
+/// Longest line (CiA 306-1, 6.2).
+const LINE_LENGTH: usize = 255;
+
+fn layout(document: &Document<'_>, findings: &mut Findings) {
+    for line in document.sections.iter().flat_map(|section| &section.lines) {
+        let length = line.raw.trim_end_matches(['\r', '\n']).chars().count();
+        if length > LINE_LENGTH {
+            let message = alloc::format!("{length} characters, {LINE_LENGTH} at most");
+            findings.add(line.number, Rule::LineLength, message);
+        }
+        if line.kind == LineKind::Comment && line.raw.trim_start().starts_with('#') {
+            findings.add(line.number, Rule::Line, "a comment begins with ;, not with #");
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Rule, read};
+    use super::check;
+    use alloc::vec::Vec;
+
+    /// A file that violates nothing.
+    const GOOD: &str = "[FileInfo]\nFileName=good.eds\nFileVersion=1\nFileRevision=1\nEDSVersion=4.0\n\
+        Description=test\nCreationTime=09:00AM\nCreationDate=03-17-2023\nCreatedBy=A\nModificationTime=12:59PM\n\
+        ModificationDate=12-31-2023\nModifiedBy=B\n\
+        [DeviceInfo]\nVendorName=V\nVendorNumber=0x123\nProductName=P\nProductNumber=1\nRevisionNumber=2\n\
+        OrderCode=O\nBaudRate_10=0\nBaudRate_20=0\nBaudRate_50=0\nBaudRate_125=1\nBaudRate_250=1\nBaudRate_500=1\n\
+        BaudRate_800=0\nBaudRate_1000=1\nSimpleBootUpMaster=0\nSimpleBootUpSlave=1\nGranularity=8\n\
+        DynamicChannelsSupported=0\nGroupMessaging=0\nNrOfRXPDO=1\nNrOfTXPDO=0\nLSS_Supported=0\n\
+        [DummyUsage]\nDummy0005=1\n\
+        [MandatoryObjects]\nSupportedObjects=3\n1=0x1000\n2=0x1001\n3=0x1018\n\
+        [1000]\nParameterName=Device type\nObjectType=0x7\nDataType=0x0007\nAccessType=ro\nDefaultValue=0x191\nPDOMapping=0\n\
+        [1001]\nParameterName=Error register\nObjectType=0x7\nDataType=0x0005\nAccessType=ro\nPDOMapping=1\n\
+        [1018]\nParameterName=Identity\nObjectType=0x9\nSubNumber=2\n\
+        [1018sub0]\nParameterName=Highest sub-index\nObjectType=0x7\nDataType=0x0005\nAccessType=const\nDefaultValue=1\nPDOMapping=0\n\
+        [1018sub1]\nParameterName=Vendor ID\nObjectType=0x7\nDataType=0x0007\nAccessType=ro\nDefaultValue=0x123\nPDOMapping=0\n\
+        [OptionalObjects]\nSupportedObjects=2\n1=0x1400\n2=0x1600\n\
+        [1400]\nParameterName=RPDO\nObjectType=0x9\nSubNumber=2\n\
+        [1400sub0]\nParameterName=Highest sub-index\nObjectType=0x7\nDataType=0x0005\nAccessType=ro\nDefaultValue=1\nPDOMapping=0\n\
+        [1400sub1]\nParameterName=COB-ID\nObjectType=0x7\nDataType=0x0007\nAccessType=rw\nDefaultValue=$NODEID+0x200\nPDOMapping=0\n\
+        [1600]\nParameterName=Mapping\nObjectType=0x9\nSubNumber=3\n\
+        [1600sub0]\nParameterName=Mapped\nObjectType=0x7\nDataType=0x0005\nAccessType=rw\nDefaultValue=2\nPDOMapping=0\n\
+        [1600sub1]\nParameterName=First\nObjectType=0x7\nDataType=0x0007\nAccessType=rw\nDefaultValue=0x00050008\nPDOMapping=0\n\
+        [1600sub2]\nParameterName=Second\nObjectType=0x7\nDataType=0x0007\nAccessType=rw\nDefaultValue=0x20000010\nPDOMapping=0\n\
+        [ManufacturerObjects]\nSupportedObjects=1\n1=0x2000\n\
+        [2000]\nParameterName=Speed\nObjectType=0x7\nDataType=0x0003\nAccessType=rww\nDefaultValue=-5\nPDOMapping=1\n\
+        LowLimit=-10\nHighLimit=10\n";
+
+    fn findings(text: &str) -> Vec<alloc::string::String> {
+        let reading = read(text.as_bytes()).unwrap();
+        check(&reading).iter().map(alloc::string::ToString::to_string).collect()
+    }
+
+    #[test]
+    fn a_good_file_has_no_findings() {
+        assert_eq!(findings(GOOD), [""; 0]);
+    }
+
+    #[test]
+    fn every_mutation_is_found_with_its_rule() {
+        let cases: [(&str, &str, Rule); 44] = [
+            ("[FileInfo]", "[FileInfos]", Rule::MissingSection),
+            ("EDSVersion=4.0", "EDSVersion=four", Rule::FileInfo),
+            ("FileVersion=1\n", "", Rule::FileInfo),
+            ("CreationTime=09:00AM", "CreationTime=21:00", Rule::FileInfo),
+            ("CreationDate=03-17-2023", "CreationDate=2023-03-17", Rule::FileInfo),
+            ("VendorName=V\n", "", Rule::DeviceInfo),
+            ("Granularity=8", "Granularity=65", Rule::DeviceInfo),
+            ("BaudRate_125=1", "BaudRate_125=yes", Rule::DeviceInfo),
+            ("VendorNumber=0x123", "VendorNumber=0x124", Rule::DeviceInfo),
+            ("NrOfRXPDO=1", "NrOfRXPDO=0", Rule::DeviceInfo),
+            ("Dummy0005=1", "Dummy0005=2", Rule::DummyUsage),
+            ("Dummy0005=1", "Dummies=1", Rule::DummyUsage),
+            ("SupportedObjects=3", "SupportedObjects=4", Rule::ListCount),
+            ("3=0x1018", "3=0x2000", Rule::List),
+            ("1=0x2000", "1=0x2001", Rule::List),
+            ("2=0x1001\n", "2=0x1001\n4=0x1002\n", Rule::List),
+            ("1=0x1400\n2=0x1600", "1=0x1400\n2=0x1600\n3=0x2000", Rule::List),
+            ("[1001]", "[1002]", Rule::Mandatory),
+            ("[1018sub1]", "[1018sub1", Rule::Line),
+            ("[1018sub1]", "[1019sub1]", Rule::Orphan),
+            ("SubNumber=2", "SubNumber=9", Rule::SubNumber),
+            ("ParameterName=Speed\n", "", Rule::MissingEntry),
+            ("DataType=0x0003\n", "", Rule::MissingEntry),
+            ("AccessType=rww", "AccessType=all", Rule::Value),
+            ("AccessType=rww", "AccessType=r/w", Rule::Spelling),
+            ("ObjectType=0x7\nDataType=0x0003", "ObjectType=0x4\nDataType=0x0003", Rule::Value),
+            ("DataType=0x0003", "DataType=0x0030", Rule::Value),
+            ("SubNumber=3\n", "SubNumber=3\nDataType=0x7\n", Rule::SurplusEntry),
+            ("LowLimit=-10", "LowLimit=low", Rule::Range),
+            ("LowLimit=-10", "LowLimit=11", Rule::Range),
+            ("DefaultValue=-5", "DefaultValue=-50", Rule::Range),
+            ("DefaultValue=-5", "DefaultValue=100000", Rule::Range),
+            ("DefaultValue=-5", "DefaultValue=08", Rule::Spelling),
+            ("$NODEID+0x200", "0x200+$NODEID", Rule::NodeId),
+            ("DefaultValue=0x191", "DefaultValue=0x191\nDefaultValue=0x192", Rule::DuplicateKey),
+            ("[1000]", "[2000]", Rule::DuplicateSection),
+            ("HighLimit=10", "HighLimit=10\nObjFlags=0x10", Rule::ObjFlags),
+            ("0x20000010", "0x20000020", Rule::PdoMapping),
+            ("0x20000010", "0x20010010", Rule::PdoMapping),
+            ("0x20000010", "0x10000020", Rule::PdoMapping),
+            ("0x00050008", "0x00070020", Rule::PdoMapping),
+            ("ParameterName=Speed", "ParameterName=Spëed", Rule::Encoding),
+            ("[1018sub0]", "[1018subx]", Rule::Header),
+            ("HighLimit=10\n", "HighLimit=10\n[DeviceComissioning]\nNodeID=128\n", Rule::Commissioning),
+        ];
+        for (from, to, rule) in cases {
+            let text = GOOD.replacen(from, to, 1);
+            assert_ne!(text, GOOD, "{from}");
+            let found = check(&read(text.as_bytes()).unwrap());
+            assert!(found.iter().any(|finding| finding.rule == rule), "{from} -> {to}: {found:#?}");
+        }
+        let long =
+            GOOD.replacen("ParameterName=Speed", &alloc::format!("ParameterName={}", "x".repeat(250)), 1);
+        let found = check(&read(long.as_bytes()).unwrap());
+        assert!(found.iter().any(|finding| finding.rule == Rule::LineLength));
+        assert!(found.iter().any(|finding| finding.rule == Rule::NameLength));
+    }
+}

@@ -1,0 +1,90 @@
+//! PDO mappings (CiA 301, 7.5.2.36 and 7.5.2.38): what the defaults, or a DCF's values, map.
+
+use alloc::format;
+
+use super::super::diagnostic::Rule;
+use super::super::model::{Device, Entry, Object};
+use super::super::reader::Findings;
+use super::super::types::{Access, DataType, PdoMapping};
+use super::super::value::Number;
+use super::Places;
+
+/// Bits of a PDO.
+const PDO_BITS: u32 = 64;
+
+pub(super) fn check(device: &Device, places: &Places<'_>, findings: &mut Findings) {
+    for object in &device.objects {
+        let receive = match object.index {
+            0x1600..=0x17FF => true,
+            0x1A00..=0x1BFF => false,
+            _ => continue,
+        };
+        let mut bits = 0;
+        for (subindex, mapped) in mapped(object) {
+            let line = places.line(object.index, Some(subindex), "DefaultValue");
+            let mut add = |message| {
+                let message = format!("{:04X}h:{subindex:02X} maps {mapped:08X}h: {message}", object.index);
+                findings.add(line, Rule::PdoMapping, message);
+            };
+            bits += mapped & 0xFF;
+            if let Err(message) = one(device, mapped, receive) {
+                add(message);
+            }
+        }
+        if bits > PDO_BITS {
+            let line = places.line(object.index, None, "");
+            let message = format!("{:04X}h maps {bits} bits, {PDO_BITS} at most", object.index);
+            findings.add(line, Rule::PdoMapping, message);
+        }
+    }
+}
+
+fn number(entry: &Entry) -> Option<u32> {
+    let text = entry.value.as_deref().or(entry.default.as_deref())?;
+    u32::try_from(Number::parse(text)?.resolve(None).ok()?).ok()
+}
+
+/// Sub-indices and entries of the mapping that are in use.
+fn mapped(object: &Object) -> impl Iterator<Item = (u8, u32)> {
+    let count = object.entry(0).and_then(number).filter(|count| *count <= 64).unwrap_or(0);
+    let used = object.subs.iter().filter(move |entry| (1..=count).contains(&u32::from(entry.subindex)));
+    used.filter_map(|entry| Some((entry.subindex, number(entry)?))).filter(|(_, mapped)| *mapped != 0)
+}
+
+fn one(device: &Device, mapped: u32, receive: bool) -> Result<(), alloc::string::String> {
+    let [high, low, subindex, bits] = mapped.to_be_bytes();
+    let index = u16::from_be_bytes([high, low]);
+    if index < 0x20 {
+        let dummy = DataType(index);
+        return match dummy.bits() {
+            _ if !receive => Err(format!("the dummy {dummy} goes into RPDOs only")),
+            Some(length) if length != bits => Err(format!("{dummy} has {length} bits")),
+            Some(_) if device.dummies().any(|allowed| allowed == dummy) => Ok(()),
+            Some(_) => Err(format!("[DummyUsage] does not allow {dummy}")),
+            None => Err(format!("{dummy} is no dummy")),
+        };
+    }
+    let Some(entry) = device.entry(index, subindex) else {
+        return Err(format!("there is no {index:04X}h:{subindex:02X}"));
+    };
+    let direction = match (entry.pdo_mapping, receive) {
+        (None | Some(PdoMapping::No), _) => Some("not at all"),
+        (Some(PdoMapping::Tpdo), true) => Some("into TPDOs only"),
+        (Some(PdoMapping::Rpdo), false) => Some("into RPDOs only"),
+        _ => match (entry.access, receive) {
+            (Some(Access::ReadOnly | Access::Const | Access::ReadWriteInput), true) => {
+                Some("into TPDOs only")
+            }
+            (Some(Access::WriteOnly | Access::ReadWriteOutput), false) => Some("into RPDOs only"),
+            _ => None,
+        },
+    };
+    if let Some(direction) = direction {
+        return Err(format!("it can be mapped {direction}"));
+    }
+    let length = entry.data_type.and_then(|data_type| device.base_type(data_type).bits());
+    match length {
+        Some(length) if length != bits => Err(format!("it has {length} bits")),
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,281 @@
+//! Concise DCF: a device's configuration as bytes, the value of 1F22h (CiA 302-3, "configuration
+//! manager").
+//!
+//! A count (u32), then for each entry index (u16), sub-index (u8), length (u32) and data; everything
+//! little-endian. The entries are written to the device in this order.
+
+use alloc::collections::BTreeMap;
+use alloc::vec::Vec;
+
+use super::model::{Device, Entry};
+use super::types::DataType;
+use super::value::{ValueError, from_bytes};
+
+/// One value to write.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct ConciseEntry {
+    /// Index.
+    pub index: u16,
+    /// Sub-index.
+    pub subindex: u8,
+    /// The value as SDO transfers it.
+    pub data: Vec<u8>,
+}
+
+/// Why bytes are no concise DCF.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ConciseError {
+    /// The bytes end inside an entry.
+    #[error("ends inside entry {entry} of {count}, at offset {offset}")]
+    Short {
+        /// Position of the entry, from 1; 0 for the count itself.
+        entry: u32,
+        /// Entries announced.
+        count: u32,
+        /// Offset of the piece that does not fit.
+        offset: usize,
+    },
+    /// Bytes follow the last entry.
+    #[error("{0} bytes follow the last entry")]
+    Surplus(usize),
+}
+
+/// A value of a device that cannot be put into a concise DCF.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
+#[error("{index:04X}h:{subindex:02X}: {error}")]
+pub struct ConciseValueError {
+    /// Index.
+    pub index: u16,
+    /// Sub-index.
+    pub subindex: u8,
+    /// What is wrong with it.
+    pub error: ValueError,
+}
+
+/// Takes a concise DCF apart.
+///
+/// # Errors
+/// [`ConciseError`] where count, lengths and bytes do not agree.
+pub fn parse_concise(bytes: &[u8]) -> Result<Vec<ConciseEntry>, ConciseError> {
+    let mut rest = Rest { bytes, offset: 0, entry: 0, count: 0 };
+    let count = u32::from_le_bytes(rest.array()?);
+    rest.count = count;
+    let mut entries = Vec::new();
+    for entry in 1..=count {
+        rest.entry = entry;
+        let index = u16::from_le_bytes(rest.array()?);
+        let [subindex] = rest.array()?;
+        let length = u32::from_le_bytes(rest.array()?);
+        let data = rest.take(usize::try_from(length).unwrap_or(usize::MAX))?.to_vec();
+        entries.push(ConciseEntry { index, subindex, data });
+    }
+    match bytes.len() - rest.offset {
+        0 => Ok(entries),
+        surplus => Err(ConciseError::Surplus(surplus)),
+    }
+}
+
+struct Rest<'a> {
+    bytes: &'a [u8],
+    offset: usize,
+    entry: u32,
+    count: u32,
+}
+
+impl<'a> Rest<'a> {
+    fn take(&mut self, length: usize) -> Result<&'a [u8], ConciseError> {
+        let end = self.offset.checked_add(length);
+        let piece = end.and_then(|end| self.bytes.get(self.offset..end)).ok_or(ConciseError::Short {
+            entry: self.entry,
+            count: self.count,
+            offset: self.offset,
+        })?;
+        self.offset += length;
+        Ok(piece)
+    }
+
+    fn array<const N: usize>(&mut self) -> Result<[u8; N], ConciseError> {
+        let piece = self.take(N)?;
+        let mut array = [0; N];
+        array.copy_from_slice(piece);
+        Ok(array)
+    }
+}
+
+/// The bytes of a concise DCF. Entries beyond 2³²−1, which no memory holds, are left out.
+#[must_use]
+pub fn encode_concise(entries: &[ConciseEntry]) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let count = u32::try_from(entries.len()).unwrap_or(u32::MAX);
+    bytes.extend(count.to_le_bytes());
+    for entry in entries {
+        bytes.extend(entry.index.to_le_bytes());
+        bytes.push(entry.subindex);
+        bytes.extend(u32::try_from(entry.data.len()).unwrap_or(u32::MAX).to_le_bytes());
+        bytes.extend(&entry.data);
+    }
+    bytes
+}
+
+/// Bit 31 of a PDO's COB-ID: the PDO does not exist (CiA 301, 7.5.2.35).
+const INVALID: u32 = 1 << 31;
+
+impl Device {
+    /// What is to be written to bring a device from its defaults to this configuration: every
+    /// `ParameterValue` that may be written and differs from the default.
+    ///
+    /// In ascending order, except PDOs, which are taken out of service while their mapping changes, as
+    /// CiA 301, 7.5.2.36 asks: COB-ID invalid, communication parameters, number of mapped objects 0,
+    /// mapping, number of mapped objects, COB-ID.
+    ///
+    /// # Errors
+    /// The first value that cannot be put into bytes.
+    pub fn to_concise(&self, node_id: Option<u8>) -> Result<Vec<ConciseEntry>, ConciseValueError> {
+        let node_id = node_id.or_else(|| self.node_id());
+        let mut changes: BTreeMap<(u16, u8), Vec<u8>> = BTreeMap::new();
+        for object in &self.objects {
+            for entry in object
+                .entries()
+                .iter()
+                .filter(|entry| entry.access.is_some_and(super::types::Access::can_write))
+            {
+                let Some(value) = entry.value_bytes(node_id) else { continue };
+                let at = (object.index, entry.subindex);
+                let value =
+                    value.map_err(|error| ConciseValueError { index: at.0, subindex: at.1, error })?;
+                if entry.default_bytes(node_id) != Some(Ok(value.clone())) {
+                    changes.insert(at, value);
+                }
+            }
+        }
+        let mut entries = Vec::new();
+        while let Some(((index, subindex), data)) = changes.pop_first() {
+            let pdo = match index {
+                0x1400..=0x15FF | 0x1800..=0x19FF => Some(index),
+                0x1600..=0x17FF | 0x1A00..=0x1BFF => Some(index - 0x200),
+                _ => None,
+            };
+            let cob_id = pdo.and_then(|pdo| self.cob_id(pdo, node_id));
+            match (pdo, cob_id) {
+                (Some(pdo), Some(cob_id)) => {
+                    changes.insert((index, subindex), data);
+                    take_pdo(pdo, cob_id, &mut changes, &mut entries);
+                }
+                _ => entries.push(ConciseEntry { index, subindex, data }),
+            }
+        }
+        Ok(entries)
+    }
+
+    /// Takes the values of a concise DCF as `ParameterValue`s. Gives the entries that the device does
+    /// not describe, and leaves these out.
+    pub fn apply_concise(&mut self, entries: &[ConciseEntry]) -> Vec<ConciseEntry> {
+        let mut unknown = Vec::new();
+        for concise in entries {
+            let base = self
+                .entry(concise.index, concise.subindex)
+                .map(|entry| self.base_type(entry.data_type.unwrap_or(DataType::DOMAIN)));
+            let place = self.object_mut(concise.index).and_then(|object| object.entry_mut(concise.subindex));
+            match (place, base) {
+                (Some(entry), Some(base)) => entry.value = Some(from_bytes(&concise.data, base)),
+                _ => unknown.push(concise.clone()),
+            }
+        }
+        unknown
+    }
+
+    /// COB-ID that a PDO shall have in the end, from value or default.
+    fn cob_id(&self, pdo: u16, node_id: Option<u8>) -> Option<u32> {
+        let entry: &Entry =
+            self.entry(pdo, 1).filter(|entry| entry.access.is_some_and(super::types::Access::can_write))?;
+        let bytes = entry.value_bytes(node_id).or_else(|| entry.default_bytes(node_id))?.ok()?;
+        Some(u32::from_le_bytes(bytes.try_into().ok()?))
+    }
+}
+
+/// Moves the changes of one PDO in the order that its mapping needs.
+fn take_pdo(
+    pdo: u16,
+    cob_id: u32,
+    changes: &mut BTreeMap<(u16, u8), Vec<u8>>,
+    entries: &mut Vec<ConciseEntry>,
+) {
+    let mapping = pdo + 0x200;
+    let mut push = |index, subindex, data| entries.push(ConciseEntry { index, subindex, data });
+    let of = |index: u16, changes: &mut BTreeMap<(u16, u8), Vec<u8>>| -> Vec<(u8, Vec<u8>)> {
+        let keys: Vec<_> = changes.range((index, 0)..=(index, u8::MAX)).map(|(key, _)| *key).collect();
+        keys.into_iter().filter_map(|key| Some((key.1, changes.remove(&key)?))).collect()
+    };
+    push(pdo, 1, (cob_id | INVALID).to_le_bytes().to_vec());
+    for (subindex, data) in of(pdo, changes).into_iter().filter(|(subindex, _)| *subindex != 1) {
+        push(pdo, subindex, data);
+    }
+    let mapped = of(mapping, changes);
+    if !mapped.is_empty() {
+        push(mapping, 0, [0].to_vec());
+        let (count, objects): (Vec<_>, Vec<_>) = mapped.into_iter().partition(|(subindex, _)| *subindex == 0);
+        for (subindex, data) in objects.into_iter().chain(count) {
+            push(mapping, subindex, data);
+        }
+    }
+    push(pdo, 1, cob_id.to_le_bytes().to_vec());
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::read;
+    use super::*;
+    use alloc::format;
+    use alloc::vec;
+
+    const DCF: &str = "[DeviceComissioning]\nNodeID=5\n[1017]\nParameterName=H\nDataType=6\nAccessType=rw\nDefaultValue=0\n\
+        ParameterValue=1000\n[1018]\nParameterName=C\nDataType=7\nAccessType=ro\nParameterValue=1\n\
+        [1800]\nParameterName=T\nObjectType=9\nSubNumber=2\n[1800sub1]\nParameterName=COB\nDataType=7\nAccessType=rw\n\
+        DefaultValue=$NODEID+0x180\n[1800sub2]\nParameterName=Type\nDataType=5\nAccessType=rw\nDefaultValue=255\nParameterValue=1\n\
+        [1A00]\nParameterName=M\nObjectType=9\nSubNumber=2\n[1A00sub0]\nParameterName=N\nDataType=5\nAccessType=rw\n\
+        DefaultValue=0\nParameterValue=1\n[1A00sub1]\nParameterName=A\nDataType=7\nAccessType=rw\nParameterValue=0x60410010\n\
+        [6000]\nParameterName=same\nDataType=5\nAccessType=rw\nDefaultValue=0x10\nParameterValue=16\n";
+
+    #[test]
+    fn pdos_are_out_of_service_while_mapped() {
+        let device = read(DCF.as_bytes()).unwrap().device;
+        let entries = device.to_concise(None).unwrap();
+        let texts: Vec<_> =
+            entries.iter().map(|e| format!("{:04X}:{} {:02X?}", e.index, e.subindex, e.data)).collect();
+        assert_eq!(
+            texts,
+            [
+                "1017:0 [E8, 03]",
+                "1800:1 [85, 01, 00, 80]",
+                "1800:2 [01]",
+                "1A00:0 [00]",
+                "1A00:1 [10, 00, 41, 60]",
+                "1A00:0 [01]",
+                "1800:1 [85, 01, 00, 00]",
+            ]
+        );
+        let bytes = encode_concise(&entries);
+        assert_eq!(bytes[..13], [7, 0, 0, 0, 0x17, 0x10, 0, 2, 0, 0, 0, 0xE8, 3]);
+        assert_eq!(parse_concise(&bytes), Ok(entries.clone()));
+
+        let mut other = device.clone();
+        for object in &mut other.objects {
+            object.own.value = None;
+            object.subs.iter_mut().for_each(|entry| entry.value = None);
+        }
+        assert_eq!(other.apply_concise(&entries), []);
+        assert_eq!(other.to_concise(Some(5)).unwrap(), entries);
+    }
+
+    #[test]
+    fn damage_is_named() {
+        let error = ConciseError::Short { entry: 0, count: 0, offset: 0 };
+        assert_eq!(parse_concise(&[1, 0, 0]), Err(error));
+        let bytes = [1, 0, 0, 0, 0x17, 0x10, 0, 0xFF, 0xFF, 0xFF, 0xFF, 1];
+        assert_eq!(parse_concise(&bytes), Err(ConciseError::Short { entry: 1, count: 1, offset: 11 }));
+        assert_eq!(parse_concise(&[0, 0, 0, 0, 9]), Err(ConciseError::Surplus(1)));
+        let unknown = vec![ConciseEntry { index: 0x2000, subindex: 0, data: vec![1] }];
+        assert_eq!(read(DCF.as_bytes()).unwrap().device.apply_concise(&unknown), unknown);
+    }
+}
