@@ -17,5 +17,6 @@ pub mod loader;
 pub mod output;
 pub mod parameters;
 pub mod storage;
+pub mod trajectory;
 
 pub use controller::{AXES, Controller, Model, OS_VERSION, Reset, ResetError, STORAGE_LEN};

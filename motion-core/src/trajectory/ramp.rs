@@ -1,0 +1,160 @@
+//! The fastest change of velocity, in normalised units: jerk 1, so that velocities, accelerations and
+//! positions are those of the axis divided by its jerk, and times stay what they are.
+
+use super::math::sqrt;
+
+/// Normalised limits: what [`super::Limits`] says, divided by the jerk.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Bounds {
+    pub(super) velocity: f64,
+    /// Acceleration while the speed grows.
+    pub(super) grow: f64,
+    /// Acceleration while the speed falls.
+    pub(super) fall: f64,
+}
+
+impl Bounds {
+    /// The bound of |a| that holds at this velocity and acceleration. Standstill counts as growing.
+    #[inline]
+    fn at(&self, v: f64, a: f64) -> f64 {
+        if v * a < 0.0 { self.fall } else { self.grow }
+    }
+
+    /// What |a| may be when the velocity changes its sign.
+    #[inline]
+    pub(super) fn crossing(&self) -> f64 {
+        self.grow.min(self.fall)
+    }
+
+    /// Whether a rise along v = `w` + a²/2 (jerk +1) reaches velocity 0 with more acceleration than
+    /// may be there.
+    #[inline]
+    pub(super) fn crosses(&self, v: f64, a: f64, w: f64) -> bool {
+        let most = self.crossing();
+        self.grow != self.fall && w < 0.0 && (a <= 0.0 || v < 0.0) && -2.0 * w > most * most
+    }
+}
+
+/// A stretch of constant jerk: −1, 0 or +1.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Leg {
+    pub(super) time: f64,
+    pub(super) jerk: f64,
+}
+
+/// The legs of one change of velocity, in order; legs of no duration are left out.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Ramp {
+    legs: [Leg; 6],
+    len: usize,
+}
+
+impl Ramp {
+    #[inline]
+    fn push(&mut self, time: f64, jerk: f64) {
+        if time > 0.0
+            && let Some(leg) = self.legs.get_mut(self.len)
+        {
+            *leg = Leg { time, jerk };
+            self.len += 1;
+        }
+    }
+
+    #[inline]
+    pub(super) fn legs(&self) -> &[Leg] {
+        self.legs.get(..self.len).unwrap_or(&[])
+    }
+
+    /// The same for an axis that runs the other way, if `sign` is −1.
+    #[inline]
+    pub(super) fn turn(&mut self, sign: f64) {
+        for leg in &mut self.legs {
+            leg.jerk *= sign;
+        }
+    }
+
+    /// Way from a state, over all legs.
+    pub(super) fn way(&self, mut v: f64, mut a: f64) -> f64 {
+        let mut way = 0.0;
+        for &Leg { time, jerk } in self.legs() {
+            way += time * (v + time * (a / 2.0 + time * jerk / 6.0));
+            v += time * (a + time * jerk / 2.0);
+            a += time * jerk;
+        }
+        way
+    }
+
+    /// The fastest way from velocity and acceleration to `target` without acceleration. The start
+    /// must be one that [`restore`] leaves.
+    #[inline]
+    pub(super) fn to(v: f64, a: f64, target: f64, bounds: &Bounds) -> Self {
+        let mut ramp = Self::default();
+        if target >= resting_velocity(v, a) {
+            ramp.rise(v, a, target, bounds, 1.0);
+        } else {
+            ramp.rise(-v, -a, -target, bounds, -1.0);
+        }
+        ramp
+    }
+
+    #[inline]
+    fn rise(&mut self, v: f64, a: f64, target: f64, bounds: &Bounds, sign: f64) {
+        let w = v - a * a / 2.0;
+        let most = bounds.crossing();
+        let through_zero = target > 0.0 && bounds.crosses(v, a, w);
+        if through_zero && target > most * most / 2.0 {
+            // The acceleration has to be `most` at velocity 0, with the other bound on either side.
+            let up = bounds.fall.min(sqrt(most * most / 2.0 - w));
+            self.push(up - a, sign);
+            if up == bounds.fall {
+                self.push((most * most / 2.0 - w) / up - up, 0.0);
+            }
+            self.push(up - most, -sign);
+            self.single(most, target + most * most / 2.0, bounds.grow, sign);
+        } else {
+            let falls = target <= 0.0 || through_zero;
+            self.single(a, target - w, if falls { bounds.fall } else { bounds.grow }, sign);
+        }
+    }
+
+    /// Up from acceleration `a` to at most `bound` and back to none; `gain` is the gain of velocity as
+    /// if it began at acceleration 0.
+    #[inline]
+    fn single(&mut self, a: f64, gain: f64, bound: f64, sign: f64) {
+        let peak = sqrt(gain);
+        if peak > bound {
+            self.push(bound - a, sign);
+            self.push(gain / bound - bound, 0.0);
+            self.push(bound, -sign);
+        } else {
+            self.push(peak - a, sign);
+            self.push(peak, -sign);
+        }
+    }
+}
+
+/// The velocity that is left when the present acceleration is taken to zero at once.
+#[inline]
+pub(super) fn resting_velocity(v: f64, a: f64) -> f64 {
+    v + a * a.abs() / 2.0
+}
+
+/// The next leg that brings an acceleration back within its bound; `None` when it is. A braking that
+/// must cross velocity 0 with too much acceleration whatever is done counts as beyond.
+#[inline]
+pub(super) fn restore(v: f64, a: f64, bounds: &Bounds) -> Option<Leg> {
+    let bound = bounds.at(v, a);
+    let size = a.abs();
+    let crosses_above =
+        v * a < 0.0 && size > bounds.grow && size * size - bounds.grow * bounds.grow > 2.0 * v.abs();
+    let goal = if crosses_above {
+        bounds.grow
+    } else if size > bound {
+        bound
+    } else {
+        return None;
+    };
+    // Rounding may leave an acceleration that exceeds its bound by its last digit.
+    let time = size - goal;
+    (time > 4.0 * f64::EPSILON * size).then_some(Leg { time, jerk: -(1.0_f64.copysign(a)) })
+}
