@@ -45,7 +45,7 @@ pub(crate) fn assert_continuous(
     profile: &Profile,
     from: &State,
     limits: &Limits,
-    what: &dyn std::fmt::Debug,
+    what: &dyn core::fmt::Debug,
 ) {
     let end = profile.end();
     let mut before = *from;
