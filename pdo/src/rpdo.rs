@@ -1,0 +1,231 @@
+//! The receiving side of a PDO: a device's RPDO, or a master's view of a device's TPDO.
+
+use core::time::Duration;
+
+use crate::mapping::LengthError;
+use crate::{CobId, Handled, Payload, Transmission};
+
+/// Communication parameters of a received PDO (CiA 301, 7.5.2.35).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RpdoConfig {
+    /// Sub-index 01h. One that is not valid, or has 29 bits, receives nothing.
+    pub cob_id: CobId,
+    /// Sub-index 02h.
+    pub transmission: Transmission,
+    /// Sub-index 05h, 1 ms a unit: longest time between two PDOs; zero: any.
+    pub timeout: Duration,
+    /// Bytes that are mapped, 0…8.
+    pub bytes: u8,
+}
+
+/// What [`Rpdo::poll_event`] tells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum RpdoEvent {
+    /// Data take effect now.
+    Data(Payload),
+    /// A PDO was too short and not processed (EMCY 8210h).
+    TooShort(LengthError),
+    /// A PDO was too long; its beginning was processed (EMCY 8220h). Told once, until one of the right
+    /// length has come.
+    TooLong(LengthError),
+    /// No PDO came in time (EMCY 8250h). Told once, until the next one has come.
+    TimedOut,
+}
+
+/// A received PDO.
+///
+/// - Input: [`handle_frame`](Self::handle_frame), [`handle_sync`](Self::handle_sync),
+///   [`handle_timeout`](Self::handle_timeout), [`reset`](Self::reset).
+/// - Output: [`poll_event`](Self::poll_event), [`poll_timeout`](Self::poll_timeout).
+///
+/// A newer PDO replaces one that has not taken effect or was not polled yet. The time-out runs from the
+/// first PDO on.
+#[derive(Debug, Clone, Copy)]
+pub struct Rpdo {
+    config: RpdoConfig,
+    /// Taken from `config`; an identifier that no frame has where it is not valid.
+    id: u16,
+    waiting: Option<Payload>,
+    ready: Option<Payload>,
+    fault: Option<RpdoEvent>,
+    was_too_long: bool,
+    deadline: Option<Duration>,
+}
+
+/// No standard frame has this identifier.
+const NONE: u16 = 0xFFFF;
+
+impl Rpdo {
+    /// Before the first PDO.
+    #[must_use]
+    pub fn new(config: RpdoConfig) -> Self {
+        let id = config.cob_id.standard_id().filter(|_| config.cob_id.is_valid()).unwrap_or(NONE);
+        Self { config, id, waiting: None, ready: None, fault: None, was_too_long: false, deadline: None }
+    }
+
+    /// The parameters.
+    #[must_use]
+    pub const fn config(&self) -> &RpdoConfig {
+        &self.config
+    }
+
+    /// Forgets what was received, as at a change of the NMT state, and takes over parameters.
+    pub fn reset(&mut self, config: RpdoConfig) {
+        *self = Self::new(config);
+    }
+
+    /// Takes a frame from the bus.
+    #[inline]
+    pub fn handle_frame(&mut self, now: Duration, frame: &impl embedded_can::Frame) -> Handled {
+        match frame.id() {
+            embedded_can::Id::Standard(id) if id.as_raw() == self.id && frame.is_data_frame() => {}
+            _ => return Handled::Ignored,
+        }
+        self.receive(now, Payload::from_slice(frame.data()));
+        Handled::Taken
+    }
+
+    #[inline]
+    fn receive(&mut self, now: Duration, payload: Payload) {
+        let expected = self.config.bytes;
+        if payload.len() != expected {
+            let error = LengthError { expected, found: payload.len() };
+            if payload.len() < expected {
+                self.fault = Some(RpdoEvent::TooShort(error));
+                return;
+            }
+            if !core::mem::replace(&mut self.was_too_long, true) {
+                self.fault = Some(RpdoEvent::TooLong(error));
+            }
+        } else {
+            self.was_too_long = false;
+        }
+        if !self.config.timeout.is_zero() {
+            self.deadline = Some(now.saturating_add(self.config.timeout));
+        }
+        let payload = Payload::new(payload.word(), expected);
+        if self.config.transmission.is_synchronous() {
+            self.waiting = Some(payload);
+        } else {
+            self.ready = Some(payload);
+        }
+    }
+
+    /// A SYNC has come: what was received before takes effect.
+    #[inline]
+    pub fn handle_sync(&mut self) {
+        if self.waiting.is_some() {
+            self.ready = self.waiting.take();
+        }
+    }
+
+    /// Notices a missing PDO; early calls do nothing.
+    pub fn handle_timeout(&mut self, now: Duration) {
+        if self.deadline.is_some_and(|deadline| now >= deadline) {
+            self.deadline = None;
+            self.fault = Some(RpdoEvent::TimedOut);
+        }
+    }
+
+    /// When to call [`handle_timeout`](Self::handle_timeout); `None` = idle.
+    #[must_use]
+    #[inline]
+    pub const fn poll_timeout(&self) -> Option<Duration> {
+        self.deadline
+    }
+
+    /// What happened, until `None`.
+    #[inline]
+    pub fn poll_event(&mut self) -> Option<RpdoEvent> {
+        if self.fault.is_some() {
+            return self.fault.take();
+        }
+        self.ready.take().map(RpdoEvent::Data)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Frame;
+
+    const fn ms(ms: u64) -> Duration {
+        Duration::from_millis(ms)
+    }
+
+    fn rpdo(transmission: u8) -> Rpdo {
+        Rpdo::new(RpdoConfig {
+            cob_id: CobId(0x201),
+            transmission: Transmission::new(transmission).unwrap(),
+            timeout: ms(100),
+            bytes: 2,
+        })
+    }
+
+    #[test]
+    fn event_driven_takes_effect_at_once() {
+        let mut rpdo = rpdo(255);
+        assert_eq!(rpdo.handle_frame(ms(0), &Frame::standard(0x202, [1, 2])), Handled::Ignored);
+        assert_eq!(rpdo.handle_frame(ms(0), &Frame::standard(0x201, [1, 2])), Handled::Taken);
+        assert_eq!(rpdo.poll_event(), Some(RpdoEvent::Data(Payload::from_slice(&[1, 2]))));
+        assert_eq!(rpdo.poll_event(), None);
+    }
+
+    #[test]
+    fn synchronous_waits_for_sync_and_the_newest_counts() {
+        for transmission in [0, 1, 240] {
+            let mut rpdo = rpdo(transmission);
+            rpdo.handle_frame(ms(0), &Frame::standard(0x201, [1, 2]));
+            rpdo.handle_frame(ms(0), &Frame::standard(0x201, [3, 4]));
+            assert_eq!(rpdo.poll_event(), None);
+            rpdo.handle_sync();
+            assert_eq!(rpdo.poll_event(), Some(RpdoEvent::Data(Payload::from_slice(&[3, 4]))));
+            rpdo.handle_sync();
+            assert_eq!(rpdo.poll_event(), None);
+        }
+    }
+
+    #[test]
+    fn lengths() {
+        let mut rpdo = rpdo(254);
+        rpdo.handle_frame(ms(0), &Frame::standard(0x201, [1]));
+        let error = LengthError { expected: 2, found: 1 };
+        assert_eq!((rpdo.poll_event(), rpdo.poll_event()), (Some(RpdoEvent::TooShort(error)), None));
+        assert_eq!(rpdo.poll_timeout(), None, "a short one is none");
+        let error = LengthError { expected: 2, found: 3 };
+        let data = Some(RpdoEvent::Data(Payload::from_slice(&[1, 2])));
+        for told in [true, false] {
+            rpdo.handle_frame(ms(0), &Frame::standard(0x201, [1, 2, 3]));
+            if told {
+                assert_eq!(rpdo.poll_event(), Some(RpdoEvent::TooLong(error)));
+            }
+            assert_eq!((rpdo.poll_event(), rpdo.poll_event()), (data, None));
+        }
+        rpdo.handle_frame(ms(0), &Frame::standard(0x201, [1, 2]));
+        assert_eq!((rpdo.poll_event(), rpdo.poll_event()), (data, None));
+        rpdo.handle_frame(ms(0), &Frame::standard(0x201, [1, 2, 3]));
+        assert_eq!(rpdo.poll_event(), Some(RpdoEvent::TooLong(error)), "again after a good one");
+    }
+
+    #[test]
+    fn a_missing_pdo_is_told_once() {
+        let mut rpdo = rpdo(255);
+        rpdo.handle_timeout(ms(1000));
+        assert_eq!(rpdo.poll_event(), None, "not before the first");
+        rpdo.handle_frame(ms(1000), &Frame::standard(0x201, [1, 2]));
+        rpdo.poll_event();
+        assert_eq!(rpdo.poll_timeout(), Some(ms(1100)));
+        rpdo.handle_timeout(ms(1099));
+        assert_eq!(rpdo.poll_event(), None);
+        rpdo.handle_timeout(ms(1100));
+        assert_eq!((rpdo.poll_event(), rpdo.poll_timeout()), (Some(RpdoEvent::TimedOut), None));
+    }
+
+    #[test]
+    fn not_valid_receives_nothing() {
+        let config = RpdoConfig { cob_id: CobId(0x8000_0201), ..*rpdo(255).config() };
+        let mut rpdo = Rpdo::new(config);
+        assert_eq!(rpdo.handle_frame(ms(0), &Frame::standard(0x201, [1, 2])), Handled::Ignored);
+    }
+}
