@@ -1,0 +1,219 @@
+//! Frames in.
+
+use core::time::Duration;
+
+use embedded_can::Id;
+use pdo::{Handled, NodeId, cob};
+
+use super::event::Notice;
+use super::node::Job;
+use super::{Event, Master};
+use crate::boot::Action;
+use crate::emcy::{Emergency, Entry};
+use crate::nmt::State;
+use crate::sdo::Buffer;
+
+impl<'d, B: Buffer, const N: usize> Master<'d, B, N> {
+    /// Takes a frame from the bus. Identifiers of the predefined connection set from nodes 1 to `N`
+    /// are the master's; anything else is ignored, so that other engines can share the bus.
+    #[inline]
+    pub fn handle_frame<F: embedded_can::Frame>(&mut self, now: Duration, frame: &F) -> Handled {
+        let Id::Standard(id) = frame.id() else { return Handled::Ignored };
+        let id = id.as_raw();
+        if frame.is_remote_frame() {
+            return Handled::Ignored;
+        }
+        let Ok(node) = NodeId::new((id & 0x7F) as u8) else { return Handled::Ignored };
+        if node > Self::LAST && id < cob::LSS_RESPONSE {
+            return Handled::Ignored;
+        }
+        match id & 0x780 {
+            0x180 => self.on_pdo::<0>(node, frame.data()),
+            0x280 => self.on_pdo::<1>(node, frame.data()),
+            0x380 => self.on_pdo::<2>(node, frame.data()),
+            0x480 => self.on_pdo::<3>(node, frame.data()),
+            cob::ERROR_CONTROL => self.on_error_control(now, node, frame.data()),
+            cob::SDO_RESPONSE => self.on_sdo(now, node, frame),
+            cob::EMCY => self.on_emergency(now, node, frame.data()),
+            _ => return self.on_other(frame),
+        }
+        Handled::Taken
+    }
+
+    #[inline]
+    fn on_pdo<const NUMBER: usize>(&mut self, id: NodeId, data: &[u8]) {
+        let Some(node) = self.nodes.get_mut(usize::from(id.raw()) - 1) else { return };
+        const { assert!(NUMBER < 4, "a node has four default PDOs") };
+        node.inputs[NUMBER].set(data);
+        self.input_new[NUMBER].insert(id);
+        self.input_flag[NUMBER].insert(id);
+    }
+
+    #[inline]
+    fn on_error_control(&mut self, now: Duration, id: NodeId, data: &[u8]) {
+        let Some(node) = self.nodes.get_mut(usize::from(id.raw()) - 1) else { return };
+        // Most frames: a heartbeat with nothing new.
+        if let (&[byte], Some(consumer)) = (data, &mut node.heartbeat)
+            && node.guard.is_none()
+            && byte != State::BootUp as u8
+            && node.state.is_some_and(|state| state as u8 == byte)
+            && !consumer.is_lost()
+            && !self.nmt_waiting.contains(id)
+            && matches!(node.job, Job::None)
+        {
+            let armed = consumer.poll_timeout().is_some();
+            consumer.handle(now);
+            if !armed {
+                let at = consumer.poll_timeout();
+                self.due(at);
+            }
+            return;
+        }
+        self.on_new_state(now, id, data);
+    }
+
+    #[cold]
+    fn on_new_state(&mut self, now: Duration, id: NodeId, data: &[u8]) {
+        let known = match data {
+            &[byte] => State::from_raw(byte).map(|state| (byte, state)),
+            _ => None,
+        };
+        let Some((byte, state)) = known else {
+            self.malformed = self.malformed.saturating_add(1);
+            return;
+        };
+        if byte == State::BootUp as u8 {
+            return self.on_boot_up(now, id);
+        }
+        let Some(node) = self.node_mut(id) else { return };
+        let toggled = byte & 0x80 != 0;
+        match (&mut node.guard, &mut node.heartbeat) {
+            (Some(guard), heartbeat) if heartbeat.is_none() || guard.is_answer(byte) => {
+                let event = guard.handle_answer(now, byte);
+                if let Some(event) = event {
+                    self.tell(Notice::Guarding(id, event));
+                    if matches!(event, crate::guarding::Event::Toggle { .. }) {
+                        return;
+                    }
+                }
+            }
+            (_, Some(consumer)) if !toggled => {
+                let event = consumer.handle(now);
+                let at = consumer.poll_timeout();
+                self.due(at);
+                if let Some(event) = event {
+                    self.tell(Notice::Heartbeat(id, event));
+                }
+            }
+            _ => {}
+        }
+        self.note_state(now, id, state);
+    }
+
+    fn on_boot_up(&mut self, now: Duration, id: NodeId) {
+        let Some(node) = self.node_mut(id) else { return };
+        let guarding = node.guard.as_mut().and_then(|guard| guard.handle_boot_up(now));
+        let heartbeat = node.heartbeat.as_mut().and_then(|consumer| consumer.handle(now));
+        let at = node.heartbeat.as_ref().and_then(crate::heartbeat::Consumer::poll_timeout);
+        // It comes to pre-operational by itself (CiA 301, 7.3.2.2.2).
+        node.state = Some(State::PreOperational);
+        let action = match &mut node.job {
+            Job::Boot(process) => process.on_boot_up(now),
+            _ => Action::Wait,
+        };
+        self.seen.insert(id);
+        self.due(at);
+        self.tell(Notice::BootUp(id));
+        if let Some(event) = guarding {
+            self.tell(Notice::Guarding(id, event));
+        }
+        if let Some(event) = heartbeat {
+            self.tell(Notice::Heartbeat(id, event));
+        }
+        self.confirm(id, State::BootUp);
+        self.carry_out(now, id, action);
+    }
+
+    fn note_state(&mut self, now: Duration, id: NodeId, state: State) {
+        let Some(node) = self.node_mut(id) else { return };
+        let changed = node.state.replace(state) != Some(state);
+        let action = match &mut node.job {
+            Job::Boot(process) => process.on_state(now, state),
+            _ => Action::Wait,
+        };
+        self.seen.insert(id);
+        if changed {
+            self.tell(Notice::State(id, state));
+        }
+        self.confirm(id, state);
+        self.carry_out(now, id, action);
+    }
+
+    /// A node shows a state: NMT commands that lead to it have done what they should.
+    fn confirm(&mut self, id: NodeId, state: State) {
+        if !self.nmt_waiting.contains(id) {
+            return;
+        }
+        let mut waiting = NodeSetOr::default();
+        for job in self.nmt.iter_mut().flatten() {
+            if job.command.leads_to() == state && job.waiting.remove(id) {
+                job.confirmed.insert(id);
+            }
+            waiting.add(job.waiting);
+        }
+        self.nmt_waiting = waiting.0;
+    }
+
+    #[inline]
+    fn on_sdo(&mut self, now: Duration, id: NodeId, frame: &impl embedded_can::Frame) {
+        let Some(node) = self.nodes.get_mut(usize::from(id.raw()) - 1) else { return };
+        node.sdo.handle_frame(now, frame);
+        self.sdo_ready.insert(id);
+        self.after_sdo(now, id);
+    }
+
+    fn on_emergency(&mut self, now: Duration, id: NodeId, data: &[u8]) {
+        match Emergency::parse(data) {
+            Some(emergency) => {
+                self.history.push(Entry { at: now, node: id, emergency });
+                self.tell(Notice::Emergency(id, emergency));
+            }
+            None => self.malformed = self.malformed.saturating_add(1),
+        }
+    }
+
+    #[cold]
+    fn on_other(&mut self, frame: &impl embedded_can::Frame) -> Handled {
+        match pdo::Frame::from_can(frame) {
+            Some(frame) => self.lss.handle_frame(&frame),
+            None => Handled::Ignored,
+        }
+    }
+}
+
+/// Gathers sets.
+#[derive(Default)]
+struct NodeSetOr(crate::node_set::NodeSet);
+
+impl NodeSetOr {
+    const fn add(&mut self, set: crate::node_set::NodeSet) {
+        self.0 = self.0.or(set);
+    }
+}
+
+impl<B> Event<B> {
+    /// The node it is about; `None` of events about several, or none.
+    #[must_use]
+    pub const fn node(&self) -> Option<NodeId> {
+        match self {
+            Self::BootUp(node)
+            | Self::State { node, .. }
+            | Self::Guarding { node, .. }
+            | Self::Heartbeat { node, .. }
+            | Self::Emergency { node, .. }
+            | Self::Sdo { node, .. }
+            | Self::Booted { node, .. } => Some(*node),
+            _ => None,
+        }
+    }
+}
