@@ -7,6 +7,7 @@ extern crate alloc;
 #[cfg(any(test, feature = "std"))]
 extern crate std;
 
+pub mod boot;
 pub mod data_type;
 pub mod ds401;
 pub mod ds402;
@@ -16,10 +17,15 @@ pub mod emcy;
 pub mod guarding;
 pub mod heartbeat;
 pub mod lss;
+pub mod master;
 pub mod nmt;
+mod node_set;
 mod ring;
+pub mod scan;
 pub mod sdo;
+pub mod slave;
 pub mod sync;
 pub mod time;
 
+pub use node_set::NodeSet;
 pub use pdo::{Address, Frame, Handled, NodeId};

@@ -112,7 +112,7 @@ impl Info {
 }
 
 /// Keeps the beginning of an upload of any length: numbers and names.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Head {
     bytes: [u8; NAME],
     len: u8,
@@ -247,7 +247,7 @@ mod tests {
         };
         assert_eq!(row.to_string(), "Nd01  1   1    0192h    SD03  00h  dI:T  dO:T");
         let silent = Row { info: None, output: None, new_input: false, new_output: false, ..row };
-        assert_eq!(silent.to_string(), "Nd01  1   -    -                    dI:F  dO:F");
+        assert_eq!(silent.to_string(), "Nd01  1   -    -                   dI:F  dO:F");
         assert_eq!((BusState::Ok.to_string(), BusState::Warn.to_string()), ("OK".into(), "BUS WARN".into()));
     }
 

@@ -41,7 +41,8 @@ impl<'d> ConciseDcf<'d> {
         if bytes.is_empty() {
             return Ok(Self::EMPTY);
         }
-        let (entries, rest) = bytes.split_first_chunk().ok_or(DcfError::Truncated { entry: 0, entries: 0 })?;
+        let (entries, rest) =
+            bytes.split_first_chunk().ok_or(DcfError::Truncated { entry: 0, entries: 0 })?;
         let checked = Self { entries: u32::from_le_bytes(*entries), rest };
         let mut walk = checked;
         let mut entry = 0;
@@ -93,7 +94,8 @@ mod tests {
         let dcf = ConciseDcf::new(&TWO).unwrap();
         assert_eq!(dcf.len(), 2);
         let entries: Vec<_> = dcf.collect();
-        let expected: [(_, &[u8]); 2] = [(Address::new(0x1017, 0), &[0xE8, 3]), (Address::new(0x2600, 1), &[22])];
+        let expected: [(_, &[u8]); 2] =
+            [(Address::new(0x1017, 0), &[0xE8, 3]), (Address::new(0x2600, 1), &[22])];
         assert_eq!(entries, expected);
         assert!(ConciseDcf::new(&[]).unwrap().is_empty());
     }

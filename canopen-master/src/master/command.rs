@@ -2,7 +2,8 @@
 
 use core::time::Duration;
 
-use pdo::{Address, DefaultPdo, Frame, NodeId};
+use pdo::cob::DefaultPdo;
+use pdo::{Address, Frame, NodeId};
 
 use super::node::{Data, Job};
 use super::{Master, NMT_COMMANDS, NmtJob, NmtTicket, QUEUE, Refused, ScanJob, SubmitError};
@@ -139,7 +140,6 @@ impl<'d, B: Buffer, const N: usize> Master<'d, B, N> {
         self.transfer(node, buffer, |client, data| client.download(at, data, options))
     }
 
-    #[expect(clippy::type_complexity, reason = "the client's own result, passed through")]
     fn transfer(
         &mut self,
         id: NodeId,
@@ -214,7 +214,12 @@ impl<'d, B: Buffer, const N: usize> Master<'d, B, N> {
     ///
     /// # Errors
     /// [`SubmitError::Busy`], [`SubmitError::OffBus`], [`SubmitError::Node`].
-    pub fn boot(&mut self, now: Duration, id: NodeId, config: &'d boot::Config<'d>) -> Result<(), SubmitError> {
+    pub fn boot(
+        &mut self,
+        now: Duration,
+        id: NodeId,
+        config: &'d boot::Config<'d>,
+    ) -> Result<(), SubmitError> {
         self.check(id)?;
         self.check_bus()?;
         let mut process = Process::new(config);

@@ -63,8 +63,8 @@ impl<'d, B: Buffer, const N: usize> Master<'d, B, N> {
 
     fn job_transfer(&mut self, id: NodeId, at: Address, write: Option<Data<'d, B>>, timeout: Duration) {
         let Some(node) = self.node_mut(id) else { return };
-        let mut options = sdo::Options::default();
-        options.timeout = timeout;
+        #[allow(clippy::needless_update)]
+        let options = sdo::Options { timeout, ..sdo::Options::default() };
         let begun = match write {
             Some(data) => node.sdo.download(at, data, &options),
             None => node.sdo.upload(at, Data::Head(Head::default()), &options),
@@ -189,7 +189,12 @@ fn note(info: &mut Info, step: ScanStep, head: &Head) {
 }
 
 /// What to read after a step.
-fn following(options: &Options, info: &Info, step: ScanStep, outcome: Outcome) -> Option<(ScanStep, Address)> {
+fn following(
+    options: &Options,
+    info: &Info,
+    step: ScanStep,
+    outcome: Outcome,
+) -> Option<(ScanStep, Address)> {
     let opmode = (options.opmode && info.is_drive()).then_some((ScanStep::OpMode, OPMODE));
     let identity = |sub| (ScanStep::Identity(sub), Address::new(IDENTITY, sub));
     match step {

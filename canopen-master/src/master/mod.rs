@@ -10,6 +10,7 @@ mod transmit;
 
 use core::time::Duration;
 
+use pdo::cob::DefaultPdo;
 use pdo::{Frame, NodeId};
 
 use crate::emcy::History;
@@ -251,13 +252,13 @@ impl<'d, B: Buffer, const N: usize> Master<'d, B, N> {
 
     /// TPDO 1…4 of a node as it came last.
     #[must_use]
-    pub fn pdo(&self, node: NodeId, number: pdo::DefaultPdo) -> Option<&Image> {
+    pub fn pdo(&self, node: NodeId, number: DefaultPdo) -> Option<&Image> {
         self.node(node)?.inputs.get(number as usize - 1)
     }
 
     /// RPDO 1…4 of a node as it was written last.
     #[must_use]
-    pub fn output(&self, node: NodeId, number: pdo::DefaultPdo) -> Option<&Image> {
+    pub fn output(&self, node: NodeId, number: DefaultPdo) -> Option<&Image> {
         self.node(node)?.outputs.get(number as usize - 1)
     }
 
@@ -311,7 +312,8 @@ impl<'d, B: Buffer, const N: usize> Master<'d, B, N> {
     /// A line of manual A's table for a node, with the numbers of its objects; the flags of new input
     /// and output are cleared.
     pub fn row(&mut self, node: NodeId, input: Option<u8>, output: Option<u8>) -> scan::Row {
-        let take = |sets: &mut [NodeSet; 4]| sets.iter_mut().fold(false, |any, set| set.remove(node) || any);
+        let take =
+            |sets: &mut [NodeSet; 4]| sets.iter_mut().map(|set| set.remove(node)).max().unwrap_or(false);
         scan::Row {
             node,
             input,
@@ -378,8 +380,8 @@ impl<'d, B: Buffer, const N: usize> Master<'d, B, N> {
     /// A PDO that has come since it was polled last: its node and number. The data are in
     /// [`pdo`](Self::pdo).
     #[inline]
-    pub fn poll_pdo(&mut self) -> Option<(NodeId, pdo::DefaultPdo)> {
-        for (set, number) in self.input_new.iter_mut().zip(pdo::DefaultPdo::ALL) {
+    pub fn poll_pdo(&mut self) -> Option<(NodeId, DefaultPdo)> {
+        for (set, number) in self.input_new.iter_mut().zip(DefaultPdo::ALL) {
             if let Some(node) = set.pop() {
                 return Some((node, number));
             }

@@ -60,7 +60,8 @@ impl<B: Buffer, const N: usize> Master<'_, B, N> {
         }
         let Some(node) = self.node_mut(id) else { return };
         if on {
-            let (due, guarding) = node.guard.as_mut().map_or((false, None), |guard| guard.handle_timeout(now));
+            let (due, guarding) =
+                node.guard.as_mut().map_or((false, None), |guard| guard.handle_timeout(now));
             let heartbeat = node.heartbeat.as_mut().and_then(|consumer| consumer.handle_timeout(now));
             if due {
                 self.guard_due.insert(id);
@@ -99,9 +100,8 @@ impl<B: Buffer, const N: usize> Master<'_, B, N> {
             bound = [bound, job.ask.or(Some(job.deadline))].into_iter().flatten().min();
         }
         self.nmt_waiting = waiting;
-        let unwatched = |id: &NodeId| {
-            self.node(*id).is_some_and(|node| node.guard.is_none() && node.heartbeat.is_none())
-        };
+        let unwatched =
+            |id: &NodeId| self.node(*id).is_some_and(|node| node.guard.is_none() && node.heartbeat.is_none());
         let ask: NodeSet = ask.iter().filter(unwatched).collect();
         self.ask_due = self.ask_due.or(ask);
         self.due(bound);

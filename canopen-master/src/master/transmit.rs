@@ -2,12 +2,14 @@
 
 use core::time::Duration;
 
-use pdo::{DefaultPdo, Frame, Service};
+use pdo::cob::DefaultPdo;
+use pdo::{Frame, Service};
 
 use super::Master;
 use super::event::Notice;
 use crate::guarding;
 use crate::nmt::{Command, Target};
+use crate::node_set::NodeSet;
 use crate::sdo::Buffer;
 
 impl<B: Buffer, const N: usize> Master<'_, B, N> {
@@ -52,7 +54,7 @@ impl<B: Buffer, const N: usize> Master<'_, B, N> {
     fn poll_output(&mut self) -> Option<Frame> {
         for number in DefaultPdo::ALL {
             let index = usize::from(number.number()) - 1;
-            let Some(id) = self.output_due.get_mut(index).and_then(|due| due.pop()) else { continue };
+            let Some(id) = self.output_due.get_mut(index).and_then(NodeSet::pop) else { continue };
             let image = self.node(id)?.outputs.get(index)?;
             let can_id = embedded_can::StandardId::new(Service::Rpdo(number, id).id())?;
             return Frame::data_frame(can_id, image.data());

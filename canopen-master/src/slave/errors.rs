@@ -1,0 +1,83 @@
+//! The device's errors: which are there, what the error register says, what is told (CiA 301, 7.2.7).
+
+use core::time::Duration;
+
+use crate::emcy::{Emergency, ErrorCode, Producer, ProducerFull};
+
+/// Errors that can be there at once, emergencies that can wait, entries of the history (1003h).
+pub const EMERGENCIES: usize = 8;
+
+#[derive(Debug, Clone)]
+pub(super) struct Errors {
+    active: [Option<ErrorCode>; EMERGENCIES],
+    producer: Producer<EMERGENCIES>,
+}
+
+impl Errors {
+    pub(super) fn new() -> Self {
+        Self { active: [None; EMERGENCIES], producer: Producer::new(0) }
+    }
+
+    pub(super) const fn register(&self) -> u8 {
+        let mut register = 0;
+        let mut rest: &[Option<ErrorCode>] = &self.active;
+        while let [first, tail @ ..] = rest {
+            if let Some(code) = first {
+                register |= code.register_bit();
+            }
+            rest = tail;
+        }
+        register
+    }
+
+    pub(super) const fn producer(&mut self) -> &mut Producer<EMERGENCIES> {
+        &mut self.producer
+    }
+
+    pub(super) fn poll_timeout(&self) -> Option<Duration> {
+        self.producer.poll_timeout()
+    }
+
+    pub(super) fn raise(&mut self, code: ErrorCode, data: [u8; 5]) -> Result<(), ProducerFull> {
+        if self.active.contains(&Some(code)) {
+            return Ok(());
+        }
+        let Some(slot) = self.active.iter_mut().find(|slot| slot.is_none()) else {
+            return Err(ProducerFull(EMERGENCIES));
+        };
+        *slot = Some(code);
+        let register = self.register();
+        self.producer.push(Emergency { code, register, data })
+    }
+
+    pub(super) fn clear(&mut self, code: ErrorCode) -> Result<(), ProducerFull> {
+        let Some(slot) = self.active.iter_mut().find(|slot| **slot == Some(code)) else { return Ok(()) };
+        *slot = None;
+        let register = self.register();
+        self.producer.push(Emergency { code: ErrorCode::NO_ERROR, register, data: [0; 5] })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_register_follows_the_errors() {
+        let mut errors = Errors::new();
+        errors.raise(ErrorCode::TEMPERATURE, [1; 5]).unwrap();
+        errors.raise(ErrorCode::LIFE_GUARD, [0; 5]).unwrap();
+        errors.raise(ErrorCode::LIFE_GUARD, [0; 5]).unwrap();
+        assert_eq!(errors.register(), 0x19);
+        errors.clear(ErrorCode::TEMPERATURE).unwrap();
+        errors.clear(ErrorCode::TEMPERATURE).unwrap();
+        let mut sent = std::vec::Vec::new();
+        while let Some(emergency) = errors.producer().poll_transmit(Duration::ZERO) {
+            sent.push((emergency.code, emergency.register));
+        }
+        let expected =
+            [(ErrorCode::TEMPERATURE, 0x09), (ErrorCode::LIFE_GUARD, 0x19), (ErrorCode::NO_ERROR, 0x11)];
+        assert_eq!(sent, expected);
+        assert_eq!(errors.producer().history().len(), 2);
+    }
+}
