@@ -349,9 +349,8 @@ impl Link {
             return Handled::Ignored;
         }
         let found = Channel::all().zip(&mut self.slots);
-        let Some((channel, slot)) = found
-            .into_iter()
-            .find(|(_, slot)| slot.id == id.as_raw() && slot.kind != Kind::Off)
+        let Some((channel, slot)) =
+            found.into_iter().find(|(_, slot)| slot.id == id.as_raw() && slot.kind != Kind::Off)
         else {
             return Handled::Ignored;
         };
