@@ -2,6 +2,7 @@
 #![forbid(unsafe_code)]
 
 pub mod can;
+pub mod canopen;
 pub mod conversation;
 pub mod plant;
 pub mod serial;

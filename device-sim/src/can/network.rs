@@ -63,7 +63,13 @@ impl Network {
                 let _ = self.bus.send(self.now, *station, frame);
             }
         }
-        let timeouts = nodes.iter().filter_map(|node| node.poll_timeout());
+        // A node that waits for room in its queue is not asked again until there is.
+        let now = self.now;
+        let waits = |station: &StationId| self.bus.room(*station) == 0;
+        let timeouts = nodes
+            .iter()
+            .zip(&self.stations)
+            .filter_map(|(node, station)| node.poll_timeout().filter(|at| *at > now || !waits(station)));
         let next = timeouts.chain(self.bus.poll_timeout()).min().filter(|next| *next <= limit);
         let Some(next) = next else {
             self.now = self.now.max(limit);
