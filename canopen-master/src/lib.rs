@@ -26,6 +26,8 @@ pub mod sdo;
 pub mod slave;
 pub mod sync;
 pub mod time;
+#[cfg(feature = "alloc")]
+pub mod trace;
 
 pub use node_set::NodeSet;
 pub use pdo::{Address, Frame, Handled, NodeId};

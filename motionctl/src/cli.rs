@@ -72,6 +72,8 @@ pub(crate) enum Command {
         #[command(subcommand)]
         command: Params,
     },
+    /// Captures to words, or to JSON objects one a line
+    Decode(crate::decode::cli::Decode),
     /// Completions for a shell
     Completions { shell: clap_complete::Shell },
     /// The manual page

@@ -9,6 +9,7 @@
 mod can;
 mod cli;
 mod connect;
+mod decode;
 mod demo;
 mod exit;
 mod image;
@@ -32,6 +33,7 @@ fn main() -> ExitCode {
         Command::Ports => ports(&out),
         Command::Lb2 { command } => lb2::run(&out, &cli.global, &command),
         Command::Params { command } => params::run(&out, &cli.global, &command),
+        Command::Decode(args) => decode::run(&out, &args),
         Command::Completions { shell } => {
             clap_complete::generate(shell, &mut Cli::command(), "motionctl", &mut std::io::stdout());
             Ok(())

@@ -10,7 +10,7 @@ use crate::cli::{Color, Global};
 use crate::exit::Exit;
 
 /// Version of the JSON documents.
-const SCHEMA_VERSION: u32 = 1;
+pub(crate) const SCHEMA_VERSION: u32 = 1;
 
 #[derive(Debug)]
 pub(crate) struct Output {

@@ -25,8 +25,8 @@ const ERROR: u32 = 0x2000_0000;
 /// What of a packet is looked at: cooked header and the largest FD frame.
 const MOST: usize = 96;
 /// How many packets, and nanoseconds, a sent frame and its other copy may lie apart.
-const PAIR_PACKETS: usize = 64;
-const PAIR_TIME: u64 = 100_000_000;
+const PAIR_PACKETS: usize = 1024;
+const PAIR_TIME: u64 = 1_000_000_000;
 
 /// What a capture file gives next.
 pub(super) enum Packet {
@@ -147,7 +147,12 @@ impl Pcap {
             let waits = match self.queue.front() {
                 None => true,
                 Some(front) => {
-                    front.cooked == Cooked::Sent && !front.paired && self.queue.len() <= PAIR_PACKETS
+                    let recent = match self.queue.back() {
+                        Some(back) => near(&front.content, &back.content),
+                        None => true,
+                    };
+                    let open = front.cooked == Cooked::Sent && !front.paired;
+                    open && recent && self.queue.len() <= PAIR_PACKETS
                 }
             };
             if waits && !self.ended {
@@ -358,14 +363,21 @@ impl Interface {
     }
 }
 
-/// Whether two packets are the same frame on the same bus at nearly the same time.
-fn same(one: &Result<Record, &'static str>, other: &Result<Record, &'static str>) -> bool {
-    let (Ok(one), Ok(other)) = (one, other) else { return false };
-    let near = match (one.time, other.time) {
+/// Whether two packets lie so near that they may be the two copies of one frame.
+fn near(one: &Result<Record, &'static str>, other: &Result<Record, &'static str>) -> bool {
+    let time = |content: &Result<Record, &'static str>| content.as_ref().ok().and_then(|record| record.time);
+    match (time(one), time(other)) {
         (Some(one), Some(other)) => one.0.abs_diff(other.0) <= PAIR_TIME,
         _ => true,
-    };
-    near && one.bus == other.bus && one.frame == other.frame
+    }
+}
+
+/// Whether two packets are the same frame on the same bus at nearly the same time.
+fn same(one: &Result<Record, &'static str>, other: &Result<Record, &'static str>) -> bool {
+    match (one, other) {
+        (Ok(first), Ok(second)) => first.frame == second.frame && first.bus == second.bus && near(one, other),
+        _ => false,
+    }
 }
 
 /// An interface description block.

@@ -1,0 +1,51 @@
+//! Arguments of `motionctl decode`.
+
+use clap::{Args, ValueEnum};
+use motion_io::capture::Format;
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct Decode {
+    /// Captures, `-` for standard input: candump logs and screen text, .asc, .trc, IXXAT text, pcap, pcapng,
+    /// LB2 as bytes or hex text
+    #[arg(required = true, value_name = "FILE")]
+    pub(crate) files: Vec<String>,
+    /// EDS or DCF that names a node's objects and says its PDO mapping
+    #[arg(long, value_name = "NODE=FILE")]
+    pub(crate) eds: Vec<String>,
+    /// 101h to 10Eh are channels of CAN Link
+    #[arg(long)]
+    pub(crate) can_link: bool,
+    /// Say every frame, not only what happens
+    #[arg(long)]
+    pub(crate) frames: bool,
+    /// Format, in place of the one that the content shows
+    #[arg(long, value_enum)]
+    pub(crate) format: Option<FormatName>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum FormatName {
+    Candump,
+    Asc,
+    Trc,
+    Ixxat,
+    Pcap,
+    /// LB2, raw bytes
+    Lb2,
+    /// LB2, hex text
+    Lb2Hex,
+}
+
+impl From<FormatName> for Format {
+    fn from(name: FormatName) -> Self {
+        match name {
+            FormatName::Candump => Self::Candump,
+            FormatName::Asc => Self::Asc,
+            FormatName::Trc => Self::Trc,
+            FormatName::Ixxat => Self::Ixxat,
+            FormatName::Pcap => Self::Pcap,
+            FormatName::Lb2 => Self::Lb2Raw,
+            FormatName::Lb2Hex => Self::Lb2Hex,
+        }
+    }
+}

@@ -1,0 +1,248 @@
+//! `motionctl decode`: captures to words, or to JSON objects one a line.
+//!
+//! `json` writes frames and transfers as the contract of `decode --json` says, `story` tells what
+//! happened, `lb2` does both for LB2 lines, `names` has the words for objects.
+
+pub(crate) mod cli;
+mod json;
+mod lb2;
+mod names;
+mod story;
+
+use std::io::{self, BufWriter, Read, Write};
+
+use canopen_master::trace::{Kind, Tracer, Transfer};
+use motion_io::capture::{Capture, CaptureError, Damage, FrameKind, Item, Reader, Record, open, open_as};
+
+use crate::exit::Exit;
+use crate::output::Output;
+use cli::Decode;
+use json::Json;
+use names::Names;
+use story::Story;
+
+/// Bytes of standard output that are written at once.
+const BLOCK: usize = 256 * 1024;
+
+/// What has been decoded, for the last object or line.
+#[derive(Debug, Default)]
+pub(crate) struct Totals {
+    frames: u64,
+    discarded_bytes: u64,
+    damaged: u64,
+    by_kind: [u64; NAMES.len()],
+}
+
+/// Names of what a frame can be, in the order of the summary.
+const NAMES: [&str; 17] = [
+    "nmt",
+    "sync",
+    "time",
+    "emcy",
+    "pdo",
+    "sdo-request",
+    "sdo-response",
+    "sdo-abort",
+    "guard-request",
+    "guard-reply",
+    "heartbeat",
+    "boot-up",
+    "lss",
+    "can-link",
+    "error-frame",
+    "unknown",
+    "lb2",
+];
+const ERROR_FRAME: usize = 14;
+const UNKNOWN: usize = 15;
+const LB2: usize = 16;
+
+/// Place in [`NAMES`].
+const fn name_of(kind: &Kind) -> usize {
+    match kind {
+        Kind::Nmt { .. } => 0,
+        Kind::Sync { .. } => 1,
+        Kind::Time(_) => 2,
+        Kind::Emcy { .. } => 3,
+        Kind::Pdo { .. } => 4,
+        Kind::SdoRequest(_) => 5,
+        Kind::SdoResponse(_) => 6,
+        Kind::SdoAbort(_) => 7,
+        Kind::GuardRequest { .. } => 8,
+        Kind::GuardReply { .. } => 9,
+        Kind::Heartbeat { .. } => 10,
+        Kind::BootUp { .. } => 11,
+        Kind::Lss(_) => 12,
+        Kind::CanLink { .. } => 13,
+        _ => UNKNOWN,
+    }
+}
+
+impl Totals {
+    fn count(&mut self, name: usize) {
+        self.frames += 1;
+        if let Some(count) = self.by_kind.get_mut(name) {
+            *count += 1;
+        }
+    }
+
+    fn kinds(&self) -> impl Iterator<Item = (&'static str, u64)> {
+        NAMES.iter().zip(self.by_kind).filter(|(_, count)| *count > 0).map(|(name, count)| (*name, count))
+    }
+}
+
+/// Says what a frame is, to a machine or to a person.
+trait Teller {
+    /// One frame. `kind` is `None` of FD frames and error reports.
+    fn frame(&mut self, record: &Record, bus: Option<&str>, kind: Option<&Kind>, tracer: &Tracer);
+    /// A transfer that has ended.
+    fn transfer(&mut self, transfer: &Transfer, bus: Option<&str>);
+    /// What is written so far.
+    fn text(&mut self) -> &mut Vec<u8>;
+}
+
+/// How the work ends early.
+enum Stop {
+    /// The reader of standard output has had enough.
+    Enough,
+    Failed(Exit),
+}
+
+impl From<Exit> for Stop {
+    fn from(exit: Exit) -> Self {
+        Self::Failed(exit)
+    }
+}
+
+impl From<io::Error> for Stop {
+    fn from(error: io::Error) -> Self {
+        match error.kind() {
+            io::ErrorKind::BrokenPipe => Self::Enough,
+            _ => Self::Failed(Exit::file("standard output", &error)),
+        }
+    }
+}
+
+pub(crate) fn run(out: &Output, args: &Decode) -> Result<(), Exit> {
+    let names = Names::read(&args.eds)?;
+    let mut totals = Totals::default();
+    let mut stdout = BufWriter::with_capacity(BLOCK, io::stdout().lock());
+    let mut decode = || -> Result<(), Stop> {
+        for file in &args.files {
+            if !out.json && args.files.len() > 1 {
+                writeln!(stdout, "== {file}")?;
+            }
+            decode_file(out, args, file, &names, &mut totals, &mut stdout)?;
+        }
+        if out.json {
+            json::summary(&totals, &mut stdout)?;
+        } else {
+            story::summary(&totals, &mut stdout)?;
+        }
+        Ok(stdout.flush()?)
+    };
+    match decode() {
+        Ok(()) | Err(Stop::Enough) => Ok(()),
+        Err(Stop::Failed(exit)) => Err(exit),
+    }
+}
+
+fn decode_file(
+    out: &Output,
+    args: &Decode,
+    file: &str,
+    names: &Names,
+    totals: &mut Totals,
+    stdout: &mut impl Write,
+) -> Result<(), Stop> {
+    let failed = |error: CaptureError| Exit::file(file, &error);
+    let source: Box<dyn Read> = if file == "-" {
+        Box::new(io::stdin().lock())
+    } else {
+        Box::new(std::fs::File::open(file).map_err(|error| Exit::file(file, &error))?)
+    };
+    let capture = match args.format {
+        Some(format) => open_as(source, format.into()),
+        None => open(source),
+    };
+    match capture.map_err(failed)? {
+        Capture::Lb2(reader) => lb2::decode(out, file, reader, totals, stdout),
+        Capture::Can(reader) => {
+            let mut tracer = Tracer::new();
+            tracer.set_can_link(args.can_link);
+            names.teach(&mut tracer);
+            if out.json {
+                decode_can(file, reader, &mut tracer, &mut Json::new(names), totals, stdout)
+            } else {
+                let mut story = Story::new(names, args.frames);
+                decode_can(file, reader, &mut tracer, &mut story, totals, stdout)?;
+                story.end(&tracer);
+                Ok(stdout.write_all(story.text())?)
+            }
+        }
+    }
+}
+
+fn decode_can<R: Read>(
+    file: &str,
+    mut reader: Reader<R>,
+    tracer: &mut Tracer,
+    teller: &mut impl Teller,
+    totals: &mut Totals,
+    stdout: &mut impl Write,
+) -> Result<(), Stop> {
+    let mut buses: Vec<Option<String>> = Vec::new();
+    // Frames of a capture without buses are on one of their own.
+    let number = |record: &Record| record.bus.map_or(u16::MAX, |bus| bus.0);
+    loop {
+        let record = match reader.next().map_err(|error| Exit::file(file, &error))? {
+            None => break,
+            Some(Item::Damage(damage)) => {
+                totals.damaged += 1;
+                report(file, &damage);
+                continue;
+            }
+            Some(Item::Frame(record)) => *record,
+        };
+        if let Some(bus) = record.bus
+            && buses.len() <= usize::from(bus.0)
+        {
+            buses.resize(usize::from(bus.0) + 1, None);
+            if let Some(slot) = buses.last_mut() {
+                *slot = reader.bus_name(bus).map(str::to_owned);
+            }
+        }
+        let name = |bus: u16| buses.get(usize::from(bus)).and_then(Option::as_deref);
+        let bus = number(&record);
+        let now = record.time.filter(|time| time.0 >= 0).map(motion_io::capture::Time::since_zero);
+        let kind = record.frame.classic().map(|frame| {
+            if record.loopback { tracer.look(bus, &frame) } else { tracer.handle_frame(now, bus, &frame) }
+        });
+        totals.count(match (&kind, record.frame.kind) {
+            (Some(kind), _) => name_of(kind),
+            (None, FrameKind::Error) => ERROR_FRAME,
+            (None, _) => UNKNOWN,
+        });
+        teller.frame(&record, name(bus), kind.as_ref(), tracer);
+        while let Some(transfer) = tracer.poll_event() {
+            teller.transfer(&transfer, name(transfer.bus));
+        }
+        if teller.text().len() >= BLOCK {
+            stdout.write_all(teller.text())?;
+            teller.text().clear();
+        }
+    }
+    tracer.finish();
+    while let Some(transfer) = tracer.poll_event() {
+        let bus = buses.get(usize::from(transfer.bus)).and_then(Option::as_deref);
+        teller.transfer(&transfer, bus);
+    }
+    stdout.write_all(teller.text())?;
+    teller.text().clear();
+    Ok(())
+}
+
+/// A line that gave no frame, on standard error.
+fn report(file: &str, damage: &Damage) {
+    eprintln!("{file}: {damage}");
+}

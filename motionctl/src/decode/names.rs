@@ -1,0 +1,401 @@
+//! Words for objects: from an EDS where one is given, otherwise from the standards (CiA 301, 401, 402).
+
+use canopen_master::data_type::{DataType, Value};
+use canopen_master::ds402::{Command, ControlWord, Mode, StatusWord};
+use canopen_master::eds::{self, Device};
+use canopen_master::trace::{Mapped, Tracer};
+use canopen_master::{Address, NodeId, ds402};
+use pdo::CobId;
+
+use crate::exit::Exit;
+
+/// What is known of the nodes' objects.
+#[derive(Debug, Default)]
+pub(super) struct Names {
+    devices: Vec<(NodeId, Device)>,
+}
+
+/// Objects of the standards: index, sub-indices, name, type of each sub-index but the number of
+/// entries at 0.
+type Known = (u16, u16, &'static str, DataType);
+
+const U8: DataType = DataType::UNSIGNED8;
+const U16: DataType = DataType::UNSIGNED16;
+const U32: DataType = DataType::UNSIGNED32;
+const I8: DataType = DataType::INTEGER8;
+const I16: DataType = DataType::INTEGER16;
+const I32: DataType = DataType::INTEGER32;
+const TEXT: DataType = DataType::VISIBLE_STRING;
+
+/// Sorted by index.
+const STANDARD: &[Known] = &[
+    (0x1000, 0x1000, "device type", U32),
+    (0x1001, 0x1001, "error register", U8),
+    (0x1002, 0x1002, "manufacturer status register", U32),
+    (0x1003, 0x1003, "error history", U32),
+    (0x1005, 0x1005, "COB-ID of SYNC", U32),
+    (0x1006, 0x1006, "SYNC period in us", U32),
+    (0x1007, 0x1007, "SYNC window in us", U32),
+    (0x1008, 0x1008, "device name", TEXT),
+    (0x1009, 0x1009, "hardware version", TEXT),
+    (0x100A, 0x100A, "software version", TEXT),
+    (0x100C, 0x100C, "guard time in ms", U16),
+    (0x100D, 0x100D, "life time factor", U8),
+    (0x1010, 0x1010, "store parameters", U32),
+    (0x1011, 0x1011, "restore defaults", U32),
+    (0x1012, 0x1012, "COB-ID of TIME", U32),
+    (0x1014, 0x1014, "COB-ID of EMCY", U32),
+    (0x1015, 0x1015, "EMCY inhibit time in 100 us", U16),
+    (0x1016, 0x1016, "heartbeat to watch", U32),
+    (0x1017, 0x1017, "heartbeat period in ms", U16),
+    (0x1018, 0x1018, "identity", U32),
+    (0x1019, 0x1019, "SYNC counter overflow", U8),
+    (0x1020, 0x1020, "verify configuration", U32),
+    (0x1029, 0x1029, "error behaviour", U8),
+    (0x1200, 0x127F, "SDO server", U32),
+    (0x1280, 0x12FF, "SDO client", U32),
+    (0x1400, 0x15FF, "RPDO", U32),
+    (0x1600, 0x17FF, "mapping of RPDO", U32),
+    (0x1800, 0x19FF, "TPDO", U32),
+    (0x1A00, 0x1BFF, "mapping of TPDO", U32),
+    (0x1F50, 0x1F50, "program data", DataType::DOMAIN),
+    (0x1F51, 0x1F51, "program control", U8),
+    (0x1F56, 0x1F56, "program identification", U32),
+    (0x1F57, 0x1F57, "flash status", U32),
+    (0x1F80, 0x1F80, "NMT start-up", U32),
+    (0x6000, 0x6000, "digital inputs", U8),
+    (0x6200, 0x6200, "digital outputs", U8),
+    (0x6401, 0x6401, "analogue inputs", I16),
+    (0x6411, 0x6411, "analogue outputs", I16),
+    (0x603F, 0x603F, "error code", U16),
+    (0x6040, 0x6040, "control word", U16),
+    (0x6041, 0x6041, "status word", U16),
+    (0x605A, 0x605A, "quick stop option", I16),
+    (0x6060, 0x6060, "mode", I8),
+    (0x6061, 0x6061, "mode display", I8),
+    (0x6062, 0x6062, "position demand", I32),
+    (0x6063, 0x6063, "position actual, internal", I32),
+    (0x6064, 0x6064, "position actual", I32),
+    (0x6065, 0x6065, "following error window", U32),
+    (0x6067, 0x6067, "position window", U32),
+    (0x606B, 0x606B, "velocity demand", I32),
+    (0x606C, 0x606C, "velocity actual", I32),
+    (0x6071, 0x6071, "target torque", I16),
+    (0x6072, 0x6072, "maximum torque", U16),
+    (0x6073, 0x6073, "maximum current", U16),
+    (0x6077, 0x6077, "torque actual", I16),
+    (0x6078, 0x6078, "current actual", I16),
+    (0x607A, 0x607A, "target position", I32),
+    (0x607C, 0x607C, "home offset", I32),
+    (0x607D, 0x607D, "software position limit", I32),
+    (0x607F, 0x607F, "maximum profile velocity", U32),
+    (0x6080, 0x6080, "maximum motor speed", U32),
+    (0x6081, 0x6081, "profile velocity", U32),
+    (0x6083, 0x6083, "profile acceleration", U32),
+    (0x6084, 0x6084, "profile deceleration", U32),
+    (0x6085, 0x6085, "quick stop deceleration", U32),
+    (0x6098, 0x6098, "homing method", I8),
+    (0x6099, 0x6099, "homing speeds", U32),
+    (0x609A, 0x609A, "homing acceleration", U32),
+    (0x60C1, 0x60C1, "interpolation data", I32),
+    (0x60C2, 0x60C2, "interpolation period", I8),
+    (0x60F4, 0x60F4, "following error actual", I32),
+    (0x60FD, 0x60FD, "digital inputs", U32),
+    (0x60FE, 0x60FE, "digital outputs", U32),
+    (0x60FF, 0x60FF, "target velocity", I32),
+    (0x6502, 0x6502, "supported modes", U32),
+];
+
+fn standard(at: Address) -> Option<&'static Known> {
+    STANDARD.iter().find(|(from, to, ..)| (*from..=*to).contains(&at.index))
+}
+
+/// What a sub-index of a communication parameter is called.
+const fn sub_name(at: Address) -> Option<(&'static str, DataType)> {
+    Some(match (at.index, at.sub) {
+        (0x1018, 1) => ("vendor", U32),
+        (0x1018, 2) => ("product", U32),
+        (0x1018, 3) => ("revision", U32),
+        (0x1018, 4) => ("serial number", U32),
+        (0x1400..=0x15FF | 0x1800..=0x19FF, 1) => ("identifier", U32),
+        (0x1400..=0x15FF | 0x1800..=0x19FF, 2) => ("transmission type", U8),
+        (0x1800..=0x19FF, 3) => ("inhibit time in 100 us", U16),
+        (0x1400..=0x15FF | 0x1800..=0x19FF, 5) => ("event timer in ms", U16),
+        (0x1800..=0x19FF, 6) => ("SYNC start value", U8),
+        (0x1600..=0x17FF | 0x1A00..=0x1BFF, 0) => ("number of objects", U8),
+        (0x1200..=0x12FF, 1) => ("identifier to the server", U32),
+        (0x1200..=0x12FF, 2) => ("identifier from the server", U32),
+        (0x1200..=0x12FF, 3) => ("node", U8),
+        (0x1016 | 0x1018 | 0x1003 | 0x1010 | 0x1011 | 0x1029 | 0x6000 | 0x6200 | 0x6401 | 0x6411, 0) => {
+            ("number of entries", U8)
+        }
+        _ => return None,
+    })
+}
+
+/// Number of the PDO that a communication or mapping parameter belongs to.
+const fn pdo_number(index: u16) -> Option<u16> {
+    match index {
+        0x1400..=0x1BFF => Some((index & 0x1FF) + 1),
+        _ => None,
+    }
+}
+
+impl Names {
+    /// Reads what `--eds NODE=FILE` names.
+    pub(super) fn read(arguments: &[String]) -> Result<Self, Exit> {
+        let mut names = Self::default();
+        for argument in arguments {
+            let parts = argument.split_once('=');
+            let node = parts.and_then(|(node, _)| NodeId::new(node.trim().parse().ok()?).ok());
+            let (Some(node), Some((_, file))) = (node, parts) else {
+                return Err(Exit::usage(format!(
+                    "--eds {argument}: NODE=FILE with a node of 1 to 127 expected"
+                )));
+            };
+            let content = std::fs::read(file).map_err(|error| Exit::file(file, &error))?;
+            let reading = eds::read(&content).map_err(|error| Exit::file(file, &error))?;
+            names.devices.push((node, reading.device));
+        }
+        Ok(names)
+    }
+
+    /// Tells the tracer what the EDS files say about identifiers and mappings.
+    pub(super) fn teach(&self, tracer: &mut Tracer) {
+        for (node, device) in &self.devices {
+            for object in device.objects.iter().filter(|object| (0x1000..=0x1BFF).contains(&object.index)) {
+                for entry in object.entries() {
+                    let id = Some(node.raw());
+                    if let Some(Ok(value)) = entry.value_bytes(id).or_else(|| entry.default_bytes(id)) {
+                        tracer.learn(*node, Address::new(object.index, entry.subindex), &value);
+                    }
+                }
+            }
+        }
+    }
+
+    fn entry(&self, node: NodeId, at: Address) -> Option<&eds::Entry> {
+        let (_, device) = self.devices.iter().find(|(known, _)| *known == node)?;
+        device.entry(at.index, at.sub)
+    }
+
+    /// The name that an EDS gives.
+    pub(super) fn given(&self, node: NodeId, at: Address) -> Option<&str> {
+        self.entry(node, at).map(|entry| entry.name.as_str())
+    }
+
+    /// The object in words: `6041h:00 status word`.
+    pub(super) fn object(&self, node: NodeId, at: Address) -> String {
+        let (index, sub) = (at.index, at.sub);
+        let mut text = format!("{index:04X}h:{sub:02X}");
+        if let Some((_, device)) = self.devices.iter().find(|(known, _)| *known == node)
+            && let Some(object) = device.object(index)
+        {
+            text.push_str(&format!(" {}", object.name()));
+            if let Some(entry) = object.entry(sub).filter(|_| object.is_composed()) {
+                text.push_str(&format!(", {}", entry.name));
+            }
+            return text;
+        }
+        let Some((_, _, name, _)) = standard(at) else { return text };
+        text.push_str(&format!(" {name}"));
+        if let Some(number) = pdo_number(index) {
+            text.push_str(&format!(" {number}"));
+        }
+        match sub_name(at) {
+            Some((name, _)) => text.push_str(&format!(", {name}")),
+            None if sub > 0 => text.push_str(&format!(" {sub}")),
+            None => {}
+        }
+        text
+    }
+
+    fn data_type(&self, node: NodeId, at: Address) -> Option<DataType> {
+        match self.entry(node, at).and_then(|entry| entry.data_type) {
+            Some(known) => Some(DataType(known.0)),
+            None => sub_name(at).map(|(_, known)| known).or_else(|| standard(at).map(|(.., known)| *known)),
+        }
+    }
+
+    /// The value as the object's type in an EDS has it.
+    pub(super) fn value(&self, node: NodeId, at: Address, data: &[u8]) -> Option<serde_json::Value> {
+        let known = self.entry(node, at)?.data_type?;
+        Some(match Value::parse(DataType(known.0), data).ok()? {
+            Value::Boolean(value) => value.into(),
+            Value::Signed(value) => value.into(),
+            Value::Unsigned(value) => value.into(),
+            Value::Real32(value) => value.into(),
+            Value::Real64(value) => value.into(),
+            Value::VisibleString(text) => String::from_utf8_lossy(text).trim_end_matches('\0').into(),
+            _ => return None,
+        })
+    }
+
+    /// The bits of an object as a number, negative where its type has a sign.
+    pub(super) fn signed(&self, node: NodeId, at: Address, bits: u8, raw: u64) -> i128 {
+        use canopen_master::data_type::Kind;
+        let signed = matches!(self.data_type(node, at).map(DataType::kind), Some(Kind::Signed(_)));
+        if signed && (1..=64).contains(&bits) {
+            let unused = 64 - u32::from(bits);
+            return i128::from((raw << unused) as i64 >> unused);
+        }
+        i128::from(raw)
+    }
+
+    /// A value in words.
+    pub(super) fn words(&self, node: NodeId, at: Address, data: &[u8]) -> String {
+        if let Some(words) = special(at, data) {
+            return words;
+        }
+        let parsed = self.data_type(node, at).and_then(|known| Value::parse(known, data).ok());
+        match parsed {
+            Some(Value::Boolean(value)) => value.to_string(),
+            Some(Value::Signed(value)) => value.to_string(),
+            Some(Value::Unsigned(value)) if value < 10 => value.to_string(),
+            Some(Value::Unsigned(value)) => format!("{value} ({value:X}h)"),
+            Some(Value::Real32(value)) => value.to_string(),
+            Some(Value::Real64(value)) => value.to_string(),
+            Some(Value::VisibleString(text)) => quoted(text),
+            _ if data.len() > 8 && data.iter().all(|byte| matches!(byte, b' '..=b'~')) => quoted(data),
+            _ => bytes(data),
+        }
+    }
+}
+
+fn quoted(text: &[u8]) -> String {
+    format!("{:?}", String::from_utf8_lossy(text).trim_end_matches('\0'))
+}
+
+/// Up to 16 bytes in hex; of more, their number too.
+pub(super) fn bytes(data: &[u8]) -> String {
+    const MOST: usize = 16;
+    let shown: Vec<String> = data.iter().take(MOST).map(|byte| format!("{byte:02X}")).collect();
+    match data.len() {
+        0 => "nothing".into(),
+        len if len > MOST => format!("{} … ({len} bytes)", shown.join(" ")),
+        _ => shown.join(" "),
+    }
+}
+
+/// Objects whose bits have a meaning of their own.
+fn special(at: Address, data: &[u8]) -> Option<String> {
+    let u16 = || data.first_chunk().map(|bytes| u16::from_le_bytes(*bytes));
+    let u32 = || data.first_chunk().map(|bytes| u32::from_le_bytes(*bytes));
+    Some(match (at.index, at.sub) {
+        (ds402::CONTROL_WORD, 0) => control(ControlWord(u16()?)),
+        (ds402::STATUS_WORD, 0) => status(StatusWord(u16()?)),
+        (ds402::MODE | ds402::MODE_DISPLAY, 0) => {
+            let &[mode, ..] = data else { return None };
+            let mode = Mode(mode as i8);
+            format!("{} ({})", mode.0, mode.name())
+        }
+        (0x1000, 0) => {
+            let value = u32()?;
+            let profile = match value & 0xFFFF {
+                0 => ", no profile".into(),
+                0x0191 => ", I/O (CiA 401)".into(),
+                0x0192 => ", drive (CiA 402)".into(),
+                profile => format!(", profile {profile}"),
+            };
+            format!("{value:08X}h{profile}")
+        }
+        (0x1018, 1..=4) => format!("{:08X}h", u32()?),
+        (0x1016, 1..) => {
+            let value = u32()?;
+            format!("node {} within {} ms", value >> 16 & 0xFF, value & 0xFFFF)
+        }
+        (0x1010, 1..) if data == b"save" => "\"save\"".into(),
+        (0x1011, 1..) if data == b"load" => "\"load\"".into(),
+        (0x1005 | 0x1012 | 0x1014, 0) | (0x1400..=0x15FF | 0x1800..=0x19FF, 1) => {
+            let cob = CobId(u32()?);
+            let off = if cob.is_valid() || at.index == 0x1005 { "" } else { ", switched off" };
+            format!("{:03X}h{off}", cob.id())
+        }
+        (0x1400..=0x15FF | 0x1800..=0x19FF, 2) => {
+            let &[kind, ..] = data else { return None };
+            match kind {
+                0 => "0, acyclic, at the SYNC".into(),
+                1 => "1, at every SYNC".into(),
+                2..=240 => format!("{kind}, at every {kind}th SYNC"),
+                252 | 253 => format!("{kind}, on request"),
+                254 | 255 => format!("{kind}, on events"),
+                _ => format!("{kind}, reserved"),
+            }
+        }
+        (0x1600..=0x17FF | 0x1A00..=0x1BFF, 1..) => {
+            let object = Mapped::from_entry(u32()?);
+            let name = standard(object.address()).map_or("", |(_, _, name, _)| name);
+            let space = if name.is_empty() { "" } else { " " };
+            format!("{:04X}h:{:02X}{space}{name}, {} bits", object.index, object.sub, object.bits)
+        }
+        _ => return None,
+    })
+}
+
+/// A control word: what it asks for.
+fn control(word: ControlWord) -> String {
+    let command = match word.command() {
+        _ if word.has(ControlWord::FAULT_RESET) => "fault reset",
+        Command::Shutdown => "shutdown",
+        Command::SwitchOn => "switch on",
+        Command::EnableOperation => "enable operation",
+        Command::DisableVoltage => "disable voltage",
+        Command::QuickStop => "quick stop",
+        Command::FaultReset => "fault reset",
+    };
+    let halt = if word.has(ControlWord::HALT) { ", halt" } else { "" };
+    let start = if word.command() == Command::EnableOperation && word.has(ControlWord::MODE_BIT_4) {
+        ", new set-point or start"
+    } else {
+        ""
+    };
+    format!("{:04X}h, {command}{start}{halt}", word.0)
+}
+
+/// A status word: the state it shows.
+fn status(word: StatusWord) -> String {
+    let mut text = format!("{:04X}h, ", word.0);
+    match word.state() {
+        Some(state) => text.push_str(&state.to_string()),
+        None => text.push_str("no state of CiA 402"),
+    }
+    for (bit, name) in [
+        (StatusWord::WARNING, ", warning"),
+        (StatusWord::TARGET_REACHED, ", target reached"),
+        (StatusWord::INTERNAL_LIMIT, ", internal limit"),
+    ] {
+        if word.has(bit) {
+            text.push_str(name);
+        }
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn standard_objects_are_in_order_and_have_words() {
+        let names = Names::default();
+        let node = NodeId::MIN;
+        assert_eq!(names.object(node, Address::new(0x1A01, 2)), "1A01h:02 mapping of TPDO 2 2");
+        assert_eq!(names.object(node, Address::new(0x1800, 1)), "1800h:01 TPDO 1, identifier");
+        assert_eq!(names.object(node, Address::new(0x2000, 1)), "2000h:01");
+        for (at, data, words) in [
+            (Address::new(0x6041, 0), &[0x37, 0x06][..], "0637h, operation enabled, target reached"),
+            (Address::new(0x6040, 0), &[0x0F, 0x00], "000Fh, enable operation"),
+            (Address::new(0x6060, 0), &[8], "8 (csp)"),
+            (Address::new(0x1000, 0), &[0x92, 0x01, 0x02, 0x00], "00020192h, drive (CiA 402)"),
+            (Address::new(0x1A00, 1), &[0x10, 0x00, 0x41, 0x60], "6041h:00 status word, 16 bits"),
+            (Address::new(0x1800, 1), &[0x81, 0x01, 0x00, 0xC0], "181h, switched off"),
+            (Address::new(0x1008, 0), b"LD 2000\0", "\"LD 2000\""),
+            (Address::new(0x6064, 0), &[0xFF, 0xFF, 0xFF, 0xFF], "-1"),
+            (Address::new(0x2000, 0), &[1, 2], "01 02"),
+        ] {
+            assert_eq!(names.words(node, at, data), words);
+        }
+        assert_eq!(names.signed(node, Address::new(0x6064, 0), 24, 0x00FF_FFFF), -1);
+        assert_eq!(names.signed(node, Address::new(0x6041, 0), 16, 0xFFFF), 0xFFFF);
+    }
+}

@@ -1,0 +1,544 @@
+//! What happened, as an engineer would tell it: each thing once, when it happens.
+//!
+//! SDO frames appear as the transfers they are part of; what repeats itself (SYNC, PDOs, heartbeats,
+//! guarding, a value polled again and again) is told when it begins and when it changes, and counted
+//! at the end.
+
+use core::fmt::Write as _;
+use std::collections::BTreeMap;
+use std::io::{self, Write};
+
+use canopen_master::ds402::StatusWord;
+use canopen_master::lss;
+use canopen_master::nmt::State;
+use canopen_master::trace::{
+    Direction as TransferDirection, Kind, Lss, Mode, Outcome, PdoDirection, Tracer, Transfer, Way,
+};
+use canopen_master::{Address, NodeId, ds402};
+use motion_io::capture::{FrameKind, Record, Time};
+
+use super::names::{Names, bytes};
+use super::{Teller, Totals};
+
+/// How many values of one object are told, unless its values are states.
+const VALUES: u32 = 4;
+/// Times from here on are times of day: the story begins at 0.
+const EPOCH: i64 = 100_000_000 * 1_000_000_000;
+
+pub(super) struct Story<'a> {
+    names: &'a Names,
+    every_frame: bool,
+    out: Vec<u8>,
+    /// Time of the first frame, where times are times of day.
+    start: Option<i64>,
+    /// Whether a bus has to be named.
+    buses: Vec<String>,
+    last_time: Option<i64>,
+    cycles: BTreeMap<Cycle, Count>,
+    objects: BTreeMap<(u16, NodeId, Address, bool), Told>,
+    drives: BTreeMap<(u16, NodeId), ds402::State>,
+    silent: BTreeMap<(u16, NodeId), u32>,
+    last: Last,
+}
+
+/// Something that repeats itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Cycle {
+    Sync(u16),
+    Time(u16),
+    Pdo(u16, NodeId, PdoDirection, u16),
+    Heartbeat(u16, NodeId),
+    Guarding(u16, NodeId),
+    Identifier(u16, u32, bool),
+}
+
+#[derive(Debug, Default)]
+struct Count {
+    number: u64,
+    first: Option<i64>,
+    last: Option<i64>,
+    /// Data of the frame before.
+    data: Vec<u8>,
+    changes: u64,
+}
+
+/// What has been told of an object.
+#[derive(Debug, Default)]
+struct Told {
+    data: Vec<u8>,
+    outcome: Option<Outcome>,
+    values: u32,
+    again: u64,
+}
+
+/// The line told last, and how often it came again.
+#[derive(Debug, Default)]
+struct Last {
+    text: String,
+    again: u64,
+}
+
+impl<'a> Story<'a> {
+    pub(super) fn new(names: &'a Names, every_frame: bool) -> Self {
+        Self {
+            names,
+            every_frame,
+            out: Vec::new(),
+            start: None,
+            buses: Vec::new(),
+            last_time: None,
+            cycles: BTreeMap::new(),
+            objects: BTreeMap::new(),
+            drives: BTreeMap::new(),
+            silent: BTreeMap::new(),
+            last: Last::default(),
+        }
+    }
+
+    /// One line, unless it is the one before again.
+    fn say(&mut self, time: Option<i64>, bus: Option<&str>, who: &str, what: &str) {
+        let mut text = String::new();
+        if let Some(bus) = bus {
+            let _ = write!(text, "{bus:<6} ");
+        }
+        let _ = write!(text, "{who:<9} {what}");
+        if text == self.last.text {
+            self.last.again += 1;
+            return;
+        }
+        self.repeated();
+        let _ = writeln!(self.out, "{:>12}  {text}", self.clock(time));
+        self.last.text = text;
+    }
+
+    /// Seconds, of times of day those since the first frame; to the microsecond.
+    fn clock(&self, time: Option<i64>) -> String {
+        let since = time.map(|time| time - self.start.unwrap_or(0));
+        since.map(|nanos| Time(nanos / 1000 * 1000).to_string()).unwrap_or_default()
+    }
+
+    fn repeated(&mut self) {
+        let again = core::mem::take(&mut self.last.again);
+        if again > 0 {
+            let _ = writeln!(self.out, "{:>12}  … the same {again} times more", "");
+        }
+    }
+
+    /// Counts a frame of a cycle: whether it is the first, and whether its data are new.
+    fn cycle(&mut self, cycle: Cycle, time: Option<i64>, data: &[u8]) -> (bool, bool) {
+        let count = self.cycles.entry(cycle).or_default();
+        let first = count.number == 0;
+        let changed = first || count.data != data;
+        count.number += 1;
+        if first {
+            count.first = time;
+        }
+        count.last = time;
+        if changed {
+            count.data.clear();
+            count.data.extend_from_slice(data);
+            count.changes += u64::from(!first);
+        }
+        (first, changed)
+    }
+
+    fn pdo(&mut self, record: &Record, bus: Option<&str>, number: u16, kind: &Kind, tracer: &Tracer) {
+        let Kind::Pdo { node, direction, number: pdo } = *kind else { return };
+        let frame = &record.frame;
+        let time = record.time.map(|time| time.0);
+        let name = if direction == PdoDirection::Transmit { "TPDO" } else { "RPDO" };
+        if frame.kind == FrameKind::Remote {
+            return self.say(time, bus, &who(node), &format!("{name} {pdo} asked for by a remote frame"));
+        }
+        let cycle = Cycle::Pdo(number, node, direction, pdo);
+        let (first, changed) = self.cycle(cycle, time, frame.data());
+        if !changed {
+            return;
+        }
+        let mut fields = Vec::new();
+        let mut news = first;
+        for field in tracer.mapped(number, kind, frame.data()) {
+            let at = field.object.address();
+            let raw = field.raw.to_le_bytes();
+            let raw = raw.get(..usize::from(field.object.bits).div_ceil(8)).unwrap_or(&raw);
+            news |= self.is_news(number, node, at, raw);
+            fields.push(format!("{} = {}", self.names.object(node, at), self.names.words(node, at, raw)));
+        }
+        if news {
+            let fields = if fields.is_empty() { bytes(frame.data()) } else { fields.join("; ") };
+            let begins = if first { " begins" } else { "" };
+            self.say(time, bus, &who(node), &format!("{name} {pdo}{begins}: {fields}"));
+        }
+    }
+
+    /// Whether a value is a state that differs from the one before.
+    fn is_news(&mut self, bus: u16, node: NodeId, at: Address, data: &[u8]) -> bool {
+        match (at, data) {
+            (Address { index: ds402::STATUS_WORD, sub: 0 }, &[low, high]) => {
+                let Some(state) = StatusWord(u16::from_le_bytes([low, high])).state() else { return false };
+                self.drives.insert((bus, node), state) != Some(state)
+            }
+            (Address { index: ds402::CONTROL_WORD | ds402::MODE | ds402::MODE_DISPLAY, sub: 0 }, data) => {
+                let told = self.objects.entry((bus, node, at, false)).or_default();
+                let news = told.data != data;
+                told.data = data.to_vec();
+                news
+            }
+            _ => false,
+        }
+    }
+
+    fn state(
+        &mut self,
+        record: &Record,
+        bus: Option<&str>,
+        node: NodeId,
+        is: Option<State>,
+        was: Option<State>,
+    ) {
+        let time = record.time.map(|time| time.0);
+        match (is, was) {
+            (None, _) => {
+                let data = bytes(record.frame.data());
+                self.say(time, bus, &who(node), &format!("shows a state that there is not: {data}"));
+            }
+            (Some(is), None) => self.say(time, bus, &who(node), &format!("is {is}")),
+            (Some(is), Some(was)) if is != was && was == State::BootUp && is == State::PreOperational => {
+                self.say(time, bus, &who(node), "has started, is pre-operational");
+            }
+            (Some(is), Some(was)) if is != was => {
+                self.say(time, bus, &who(node), &format!("is {is} now, was {was}"));
+            }
+            _ => {}
+        }
+    }
+
+    /// One line for every frame.
+    fn raw(&mut self, record: &Record, bus: Option<&str>, kind: Option<&Kind>) {
+        let name = match (kind, record.frame.kind) {
+            (Some(kind), _) => super::NAMES[super::name_of(kind)],
+            (None, FrameKind::Error) => "error-frame",
+            (None, _) => "CAN FD",
+        };
+        self.repeated();
+        self.last.text.clear();
+        let time =
+            record.time.map(|time| Time(time.0 - self.start.unwrap_or(0)).to_string()).unwrap_or_default();
+        let copy = if record.loopback { "  (copy)" } else { "" };
+        let bus = bus.unwrap_or("");
+        let _ = writeln!(self.out, "{time:>12}  {bus:<6}   · {:?}  {name}{copy}", record.frame);
+    }
+
+    /// The counts, when the capture has ended.
+    pub(super) fn end(&mut self, tracer: &Tracer) {
+        self.repeated();
+        if self.cycles.values().any(|count| count.number > 1) {
+            let _ = writeln!(self.out, "\nwhat repeated itself:");
+        }
+        let cycles = core::mem::take(&mut self.cycles);
+        for (cycle, count) in cycles.iter().filter(|(_, count)| count.number > 1) {
+            let (bus, what) = match *cycle {
+                Cycle::Sync(bus) => (bus, "SYNC".into()),
+                Cycle::Time(bus) => (bus, "TIME".into()),
+                Cycle::Pdo(bus, node, PdoDirection::Transmit, number) => {
+                    (bus, format!("node {node} TPDO {number}"))
+                }
+                Cycle::Pdo(bus, node, PdoDirection::Receive, number) => {
+                    (bus, format!("node {node} RPDO {number}"))
+                }
+                Cycle::Heartbeat(bus, node) => {
+                    let state =
+                        tracer.state(bus, node).map(|state| format!(", at last {state}")).unwrap_or_default();
+                    (bus, format!("node {node} heartbeat{state}"))
+                }
+                Cycle::Guarding(bus, node) => (bus, format!("node {node} guarding")),
+                Cycle::Identifier(bus, id, extended) => {
+                    let width = if extended { 8 } else { 3 };
+                    (bus, format!("identifier {id:0width$X}h"))
+                }
+            };
+            let bus = match self.buses.get(usize::from(bus)) {
+                Some(name) if self.buses.len() > 1 => format!("{name} "),
+                _ => String::new(),
+            };
+            let period = match (count.first, count.last) {
+                (Some(first), Some(last)) if last > first => {
+                    let period = (last - first) as f64 / (count.number - 1) as f64 / 1e6;
+                    format!(", every {period:.1} ms")
+                }
+                _ => String::new(),
+            };
+            let changes = match (cycle, count.changes) {
+                (Cycle::Pdo(..) | Cycle::Identifier(..), 0) => ", always the same".into(),
+                (Cycle::Pdo(..) | Cycle::Identifier(..), 1) => ", 1 change".into(),
+                (Cycle::Pdo(..) | Cycle::Identifier(..), changes) => format!(", {changes} changes"),
+                _ => String::new(),
+            };
+            let _ = writeln!(self.out, "  {bus}{what}: {} times{period}{changes}", count.number);
+        }
+        let again: u64 = self.objects.values().map(|told| told.again).sum();
+        if again > 0 {
+            let _ = writeln!(self.out, "  SDO transfers with no news: {again}");
+        }
+    }
+}
+
+fn who(node: NodeId) -> String {
+    format!("node {node}")
+}
+
+fn number_of(record: &Record) -> u16 {
+    record.bus.map_or(u16::MAX, |bus| bus.0)
+}
+
+fn in_ms(from: Option<core::time::Duration>, to: Option<core::time::Duration>) -> String {
+    match from.zip(to).and_then(|(from, to)| to.checked_sub(from)) {
+        Some(time) if !time.is_zero() => format!(" in {:.1} ms", time.as_secs_f64() * 1e3),
+        _ => String::new(),
+    }
+}
+
+impl Teller for Story<'_> {
+    fn frame(&mut self, record: &Record, bus: Option<&str>, kind: Option<&Kind>, tracer: &Tracer) {
+        let time = record.time.map(|time| time.0);
+        if self.start.is_none()
+            && let Some(first) = time.filter(|time| *time >= EPOCH)
+        {
+            self.start = Some(first);
+            let _ = writeln!(self.out, "{:>12}  is {}", "0.000000", date(first));
+        }
+        self.last_time = time;
+        let number = number_of(record);
+        if let Some(name) = bus
+            && self.buses.len() <= usize::from(number)
+        {
+            self.buses.push(name.to_owned());
+        }
+        if self.every_frame {
+            self.raw(record, bus, kind);
+        }
+        if record.loopback {
+            return;
+        }
+        let frame = &record.frame;
+        let Some(kind) = kind else {
+            if frame.kind == FrameKind::Error {
+                self.say(
+                    time,
+                    bus,
+                    "bus",
+                    &format!("error report: class {:X}h, {}", frame.id, bytes(frame.data())),
+                );
+            } else if self.cycle(Cycle::Identifier(number, frame.id, frame.extended), time, frame.data()).0 {
+                self.say(time, bus, "bus", &format!("CAN FD frame {frame:?}"));
+            }
+            return;
+        };
+        match *kind {
+            Kind::Nmt { command, target } => {
+                let whom = if target == 0 { "all nodes".into() } else { format!("node {target}") };
+                let what = command.map_or_else(|| "an unknown command".into(), |command| command.to_string());
+                self.say(time, bus, "master", &format!("tells {whom}: {what}"));
+            }
+            Kind::Sync { counter, .. } => {
+                if self.cycle(Cycle::Sync(number), time, &[]).0 {
+                    let counter = if counter.is_some() { ", with counter" } else { "" };
+                    self.say(time, bus, "SYNC", &format!("begins{counter}"));
+                }
+            }
+            Kind::Time(day) => {
+                if self.cycle(Cycle::Time(number), time, &[]).0 {
+                    let day = day.map_or_else(
+                        || "shorter than 6 bytes".into(),
+                        |day| date(i64::try_from(day.unix_ms()).unwrap_or(0).saturating_mul(1_000_000)),
+                    );
+                    self.say(time, bus, "TIME", &day);
+                }
+            }
+            Kind::Emcy { node, code, register } => {
+                let what = match code {
+                    Some(code) if code.0 == 0 => "emergency over: no error".into(),
+                    Some(code) => format!("EMERGENCY {:04X}h, {}", code.0, code.name()),
+                    None => "EMERGENCY without a code".into(),
+                };
+                let register =
+                    register.map(|register| format!(", register {register:02X}h")).unwrap_or_default();
+                let rest = match frame.data().get(3..) {
+                    Some(rest) if rest.iter().any(|byte| *byte != 0) => {
+                        format!(", manufacturer {}", bytes(rest))
+                    }
+                    _ => String::new(),
+                };
+                self.say(time, bus, &who(node), &format!("{what}{register}{rest}"));
+            }
+            Kind::Pdo { .. } => self.pdo(record, bus, number, kind, tracer),
+            Kind::GuardRequest { node, unanswered } => {
+                let (first, _) = self.cycle(Cycle::Guarding(number, node), time, &[]);
+                if first {
+                    self.say(time, bus, "master", &format!("guards node {node}"));
+                }
+                if unanswered {
+                    let silent = self.silent.entry((number, node)).or_default();
+                    *silent += 1;
+                    if *silent == 1 {
+                        self.say(time, bus, &who(node), "does not answer when guarded");
+                    }
+                }
+            }
+            Kind::GuardReply { node, wrong_toggle, state, before, .. } => {
+                if let Some(silent) = self.silent.remove(&(number, node)) {
+                    self.say(time, bus, &who(node), &format!("answers again after {silent} guard requests"));
+                }
+                if wrong_toggle {
+                    self.say(time, bus, &who(node), "guard reply with the toggle bit of the one before");
+                }
+                self.state(record, bus, node, state, before);
+            }
+            Kind::Heartbeat { node, state, before } => {
+                self.cycle(Cycle::Heartbeat(number, node), time, &[]);
+                self.state(record, bus, node, state, before);
+            }
+            Kind::BootUp { node, before } => {
+                self.drives.remove(&(number, node));
+                let again = if before.is_some_and(|before| before != State::BootUp) { " again" } else { "" };
+                self.say(time, bus, &who(node), &format!("boots up{again}"));
+            }
+            Kind::Lss(message) => {
+                let (from, what) = lss_words(&message, frame.data());
+                self.say(time, bus, from, &what);
+            }
+            Kind::CanLink { channel } => {
+                if self.cycle(Cycle::Identifier(number, frame.id, false), time, frame.data()).0 {
+                    self.say(
+                        time,
+                        bus,
+                        "CAN Link",
+                        &format!("channel {channel} begins: {}", bytes(frame.data())),
+                    );
+                }
+            }
+            Kind::SdoRequest(_) | Kind::SdoResponse(_) => {}
+            // Aborts of transfers are told with them; others have no request in the capture.
+            Kind::SdoAbort(_) => {}
+            _ => {
+                if self.cycle(Cycle::Identifier(number, frame.id, frame.extended), time, frame.data()).0 {
+                    self.say(time, bus, "bus", &format!("identifier of no known service: {frame:?}"));
+                }
+            }
+        }
+    }
+
+    fn transfer(&mut self, transfer: &Transfer, bus: Option<&str>) {
+        let Transfer { node, at, .. } = *transfer;
+        let upload = transfer.direction == TransferDirection::Upload;
+        let news = transfer.is_done() && self.is_news(transfer.bus, node, at, &transfer.data);
+        let told = self.objects.entry((transfer.bus, node, at, upload)).or_default();
+        let same = told.outcome == Some(transfer.outcome) && told.data == transfer.data && told.values > 0;
+        let writes_state = !upload && matches!(at.index, ds402::CONTROL_WORD | ds402::MODE);
+        if !news && !writes_state && (same || told.values >= VALUES) {
+            told.again += 1;
+            return;
+        }
+        told.values += 1;
+        told.outcome = Some(transfer.outcome);
+        told.data.clone_from(&transfer.data);
+        let more = if told.values == VALUES && !news && !writes_state { " (and so on)" } else { "" };
+        let object = self.names.object(node, at);
+        let value = self.names.words(node, at, &transfer.data);
+        let verb = if upload { "read" } else { "write" };
+        let how = match transfer.mode {
+            Mode::Expedited => String::new(),
+            mode => {
+                let mode = if mode == Mode::Block { "block" } else { "segmented" };
+                format!("  [{mode}, {} bytes{}]", transfer.size, in_ms(transfer.began, transfer.ended))
+            }
+        };
+        let what = match transfer.outcome {
+            Outcome::Done => format!("{verb:<5} {object} = {value}{how}"),
+            Outcome::Aborted { by: Way::Response, code } if upload => {
+                format!("{verb:<5} {object}: REFUSED, {code}{how}")
+            }
+            Outcome::Aborted { by: Way::Response, code } => {
+                format!("{verb:<5} {object} = {value}: REFUSED, {code}{how}")
+            }
+            Outcome::Aborted { by: Way::Request, code } => {
+                format!("{verb:<5} {object}: the client gave up, {code}{how}")
+            }
+            Outcome::Incomplete if transfer.frames == 1 => format!("{verb:<5} {object}: NO ANSWER"),
+            Outcome::Incomplete => format!("{verb:<5} {object}: unfinished, {value}{how}"),
+        };
+        let time = transfer.ended.and_then(|time| i64::try_from(time.as_nanos()).ok());
+        self.say(time, bus, &who(node), &format!("{what}{more}"));
+    }
+
+    fn text(&mut self) -> &mut Vec<u8> {
+        &mut self.out
+    }
+}
+
+fn lss_words(message: &Lss, data: &[u8]) -> (&'static str, String) {
+    match message {
+        Lss::Request(Some(request)) => {
+            let what = match *request {
+                lss::Request::SwitchGlobal(mode) => format!("all to {mode:?}").to_lowercase(),
+                lss::Request::Select(part, value) => format!("select {part:?} {value:08X}h").to_lowercase(),
+                lss::Request::ConfigureNodeId(node) => format!("node ID is to be {node}"),
+                lss::Request::ConfigureBitTiming { table, index } => {
+                    let rate = lss::BitTiming::from_index(index)
+                        .filter(|_| table == 0)
+                        .and_then(lss::BitTiming::kbits);
+                    match rate {
+                        Some(rate) => format!("bit rate is to be {rate} kbit/s"),
+                        None => format!("bit rate is to be number {index} of table {table}"),
+                    }
+                }
+                lss::Request::ActivateBitTiming { delay_ms } => {
+                    format!("change the bit rate in {delay_ms} ms")
+                }
+                lss::Request::Store => "store node ID and bit rate".into(),
+                lss::Request::Inquire(part) => format!("say your {part:?}").to_lowercase(),
+                lss::Request::InquireNodeId => "say your node ID".into(),
+                lss::Request::IdentifyUnconfigured => "who has no node ID?".into(),
+                lss::Request::Fastscan { number, bit, part, .. } => {
+                    format!("fastscan {part:?} {number:08X}h from bit {bit}").to_lowercase()
+                }
+            };
+            ("LSS", format!("master: {what}"))
+        }
+        Lss::Response(Some(response)) => {
+            let what = match *response {
+                lss::Response::Selected => "selected".into(),
+                lss::Response::Done { result, .. } => result.to_string(),
+                lss::Response::Identity(part, value) => format!("{part:?} {value:08X}h").to_lowercase(),
+                lss::Response::NodeId(node) => format!("node ID {node}"),
+                lss::Response::Identified => "here, it matches".into(),
+                lss::Response::Unconfigured => "here, without node ID".into(),
+            };
+            ("LSS", format!("slave: {what}"))
+        }
+        Lss::Request(None) => ("LSS", format!("master: unknown command, {}", bytes(data))),
+        Lss::Response(None) => ("LSS", format!("slave: unknown command, {}", bytes(data))),
+    }
+}
+
+/// Nanoseconds since 1970 as date and time of day, UTC.
+fn date(nanos: i64) -> String {
+    let since = core::time::Duration::from_nanos(u64::try_from(nanos).unwrap_or(0));
+    humantime::format_rfc3339_millis(std::time::UNIX_EPOCH + since).to_string()
+}
+
+/// The last line.
+pub(super) fn summary(totals: &Totals, out: &mut impl Write) -> io::Result<()> {
+    let kinds: Vec<String> = totals.kinds().map(|(name, count)| format!("{count} {name}")).collect();
+    write!(out, "\n{} frames", totals.frames)?;
+    if !kinds.is_empty() {
+        write!(out, ": {}", kinds.join(", "))?;
+    }
+    if totals.damaged > 0 {
+        write!(out, "; {} lines gave no frame", totals.damaged)?;
+    }
+    if totals.discarded_bytes > 0 {
+        write!(out, "; {} bytes outside of telegrams", totals.discarded_bytes)?;
+    }
+    writeln!(out)
+}
