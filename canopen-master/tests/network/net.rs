@@ -1,7 +1,7 @@
 //! A master and slaves on virtual time; frames take none.
 
+use core::time::Duration;
 use std::collections::BTreeMap;
-use std::time::Duration;
 
 use canopen_master::lss::Identity;
 use canopen_master::master::{Config, Event, Master};
@@ -50,7 +50,7 @@ impl Access for Dictionary {
         }
         self.incoming.extend_from_slice(piece.data);
         if piece.last {
-            *object = std::mem::take(&mut self.incoming);
+            *object = core::mem::take(&mut self.incoming);
         }
         Ok(())
     }

@@ -12,7 +12,7 @@ const LOST: guarding::Event = guarding::Event::Lost;
 const BACK: guarding::Event = guarding::Event::Back;
 
 fn guarding_events(net: &mut Net) -> Vec<(u64, guarding::Event)> {
-    let events = std::mem::take(&mut net.events);
+    let events = core::mem::take(&mut net.events);
     events
         .into_iter()
         .filter_map(|(at, event)| match event {
