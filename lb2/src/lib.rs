@@ -7,6 +7,8 @@ extern crate alloc;
 #[cfg(test)]
 extern crate std;
 
+#[cfg(feature = "can")]
+pub mod can;
 pub mod code;
 pub mod device;
 pub mod frame;

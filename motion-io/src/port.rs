@@ -104,6 +104,7 @@ pub fn open(endpoint: &Endpoint, role: Role) -> Result<Box<dyn Port>, OpenError>
                 Err(OpenError::NotBuilt { endpoint: endpoint.to_string(), feature: "serial" })
             };
         }
+        Endpoint::Can(can) => Ok(Box::new(crate::can::Stream::new(crate::can::open(can)?, role))),
         Endpoint::Tcp { address } => crate::tcp::open(endpoint, address, role),
         Endpoint::Pty { link } => {
             #[cfg(all(feature = "pty", unix))]

@@ -87,7 +87,7 @@ pub(crate) enum Sim {
         /// 8230, 8231, 8235 or 8236
         #[arg(long, default_value_t = 8230)]
         model: u16,
-        /// Endpoint to answer on: pty:LINK, tcp:HOST:PORT or a serial port
+        /// Endpoint to answer on: pty:LINK, tcp:HOST:PORT, a serial port, or for LB2 over CAN a CAN endpoint
         #[arg(long, value_name = "EP")]
         serial: String,
         /// File for flash and retained values; absent: in memory
@@ -101,7 +101,8 @@ pub(crate) enum Sim {
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct Line {
-    /// Serial endpoint: /dev/ttyUSB0, serial:PATH?baud=…&parity=…&stop=…, tcp:HOST:PORT, or a name of the configuration
+    /// Serial endpoint: /dev/ttyUSB0, serial:PATH?baud=…&parity=…&stop=…, tcp:HOST:PORT, or a name of the
+    /// configuration; a CAN endpoint for LB2 over CAN
     #[arg(long, value_name = "EP", env = "MOTIONCTL_PORT")]
     pub(crate) port: Option<String>,
     /// Select the device with this number (0 to 31) first

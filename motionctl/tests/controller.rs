@@ -48,6 +48,22 @@ fn identify_backup_compare_set_restore() {
     bench.run(&["params", "compare", "F.toml", "F.toml"]).ends(0).says("606 equal");
 }
 
+/// LB2 over CAN: a whole backup over an slcan adapter equals the one over a serial line.
+#[test]
+fn a_backup_over_can_equals_the_one_over_serial() {
+    let bench = Bench::new();
+    let controller = bench.controller(&[]);
+    bench.run(&["params", "set", "--port", "LINE", "642", "1000", "756", "77", "--save"]).ends(0);
+    bench.run(&["params", "backup", "--port", "LINE", "SERIAL.toml"]).ends(0);
+    controller.kill();
+    let _controller = bench.controller_on("slcan-pty:CAN", &[]);
+    let port = "slcan:CAN?bitrate=500000";
+    bench.run(&["params", "backup", "--port", port, "CAN.toml"]).ends(0);
+    bench.run(&["params", "compare", "SERIAL.toml", "CAN.toml"]).ends(0).says("606 equal");
+    bench.run(&["params", "set", "--port", port, "756", "78", "--save"]).ends(0);
+    bench.run(&["params", "compare", "--port", port, "SERIAL.toml"]).ends(1).says("1 different");
+}
+
 /// `kill -9` between write and save loses what was written, and nothing that was saved.
 #[test]
 fn a_killed_controller_keeps_what_was_saved() {

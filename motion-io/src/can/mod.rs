@@ -6,6 +6,7 @@ mod slcan;
 #[cfg(all(feature = "socketcan", target_os = "linux"))]
 mod socketcan;
 mod socketcand;
+mod stream;
 #[cfg(feature = "virtual")]
 mod virtual_bus;
 
@@ -18,6 +19,7 @@ use pdo::Frame;
 pub use drive::{Driver, Engine};
 #[cfg(feature = "virtual")]
 pub use socketcand::Server;
+pub use stream::Stream;
 #[cfg(feature = "virtual")]
 pub use virtual_bus::{VirtualBus, VirtualPort};
 

@@ -52,6 +52,14 @@ const BIT_RATE: u32 = 500_000;
 /// Most slcan adapters are USB devices that ignore it.
 const BAUD: u32 = 115_200;
 
+impl CanEndpoint {
+    /// Whether a text is meant as a CAN endpoint, right or wrong.
+    pub(super) fn names(text: &str) -> bool {
+        const KINDS: [&str; 5] = ["socketcan", "virtual", "slcan-pty", "slcan", "socketcand"];
+        text.split_once(':').is_some_and(|(kind, _)| KINDS.contains(&kind))
+    }
+}
+
 impl FromStr for CanEndpoint {
     type Err = EndpointError;
 

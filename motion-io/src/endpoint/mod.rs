@@ -7,7 +7,7 @@
 //! | `tcp:HOST:PORT` | a byte stream over TCP |
 //! | `pty:LINK` | a pseudo-terminal made by us, linked at the path LINK |
 //!
-//! CAN:
+//! CAN, which carries a byte stream too (LB2 over CAN, [`lb2::can`]):
 //!
 //! | written | means |
 //! |---|---|
@@ -47,6 +47,8 @@ pub enum Endpoint {
         /// Path of the symbolic link to its other end.
         link: PathBuf,
     },
+    /// LB2 over CAN: the byte stream cut into CAN frames ([`lb2::can`]).
+    Can(CanEndpoint),
 }
 
 /// Parity bit of a character.
@@ -146,6 +148,9 @@ impl FromStr for Endpoint {
                 Ok(Self::Pty { link: link.into() })
             };
         }
+        if CanEndpoint::names(text) {
+            return text.parse().map(Self::Can);
+        }
         let (path, query) = match text.strip_prefix("serial:") {
             Some(rest) => rest.split_once('?').unwrap_or((rest, "")),
             None => (text, ""),
@@ -208,6 +213,7 @@ impl fmt::Display for Endpoint {
             }
             Self::Tcp { address } => write!(f, "tcp:{address}"),
             Self::Pty { link } => write!(f, "pty:{}", link.display()),
+            Self::Can(endpoint) => endpoint.fmt(f),
         }
     }
 }
@@ -225,6 +231,8 @@ mod tests {
             "tcp:127.0.0.1:4000",
             "tcp:[::1]:4000",
             "pty:/tmp/line",
+            "socketcan:can0",
+            "slcan-pty:/tmp/can",
         ] {
             assert_eq!(text.parse::<Endpoint>().unwrap().to_string(), text);
         }

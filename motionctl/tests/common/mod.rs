@@ -32,7 +32,12 @@ impl Bench {
 
     /// A virtual controller on LINE, ready to answer, with its flash in FLASH.
     pub(crate) fn controller(&self, more: &[&str]) -> Controller {
-        let mut arguments = vec!["sim", "controller", "--serial", "pty:LINE", "--state", "FLASH"];
+        self.controller_on("pty:LINE", more)
+    }
+
+    /// The same on another endpoint.
+    pub(crate) fn controller_on(&self, endpoint: &str, more: &[&str]) -> Controller {
+        let mut arguments = vec!["sim", "controller", "--serial", endpoint, "--state", "FLASH"];
         arguments.extend(more);
         let mut child = Command::new(env!("CARGO_BIN_EXE_motionctl"))
             .args(arguments)
@@ -44,7 +49,7 @@ impl Bench {
         let mut said = BufReader::new(child.stdout.take().unwrap());
         let mut line = String::new();
         said.read_line(&mut line).unwrap();
-        assert!(line.contains("listening on pty:LINE"), "{line:?}");
+        assert!(line.contains(&format!("listening on {endpoint}")), "{line:?}");
         Controller { child, _said: said }
     }
 }
