@@ -20,6 +20,7 @@ pub mod lss;
 pub mod master;
 pub mod nmt;
 mod node_set;
+pub mod od;
 mod ring;
 pub mod scan;
 pub mod sdo;

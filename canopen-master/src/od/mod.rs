@@ -1,0 +1,19 @@
+//! The object dictionary of the slave role (CiA 301, 7.4): a constant table of entries, the values in
+//! memory that the caller gives, no allocation.
+//!
+//! [`Table`] says what exists; [`Dictionary`] holds the values and answers a
+//! [`Server`](crate::sdo::Server); [`Hooks`] is the application's part; [`Pdos`] has the communication and
+//! mapping parameters of the PDOs, which may change at run time, and moves process data; [`Objects`] joins
+//! both for the server.
+
+mod dictionary;
+mod entry;
+mod hooks;
+mod pdos;
+mod table;
+
+pub use dictionary::{Dictionary, RamError};
+pub use entry::{Entry, Initial, Limits, Place, Rights};
+pub use hooks::{Hooks, Stored};
+pub use pdos::{Communication, Objects, PdoSlot, Pdos};
+pub use table::{Table, TableError, View};

@@ -1,0 +1,385 @@
+//! The PDOs of a slave: their parameters as objects 1400h…1BFFh, changed at run time in the order that
+//! CiA 301 (7.5.2.35…38) asks for, and process data to and from the dictionary.
+
+use core::time::Duration;
+
+use pdo::mapping::Entry as Mapped;
+use pdo::{
+    Address, CobId, Frame, Handled, Mapping, Payload, Rpdo, RpdoConfig, RpdoEvent, Tpdo, TpdoConfig,
+    Transmission, cob,
+};
+
+use super::{Dictionary, Hooks};
+use crate::data_type::Scalar;
+use crate::sdo::{AbortCode, Access, Piece, Small, Total, read_slice};
+
+/// Communication parameters in the units of the objects.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Communication {
+    /// Sub-index 01h.
+    pub cob_id: CobId,
+    /// Sub-index 02h.
+    pub transmission: Transmission,
+    /// Sub-index 03h, 100 µs.
+    pub inhibit: u16,
+    /// Sub-index 05h, 1 ms.
+    pub event_timer: u16,
+    /// Sub-index 06h, of a TPDO.
+    pub sync_start: u8,
+}
+
+impl Communication {
+    /// Event-driven, by the device profile, with this COB-ID.
+    #[must_use]
+    pub const fn event_driven(cob_id: CobId) -> Self {
+        Self { cob_id, transmission: Transmission::EventProfile, inhibit: 0, event_timer: 0, sync_start: 0 }
+    }
+}
+
+/// One PDO: its parameters and its up to `M` mapped objects.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PdoSlot<const M: usize> {
+    /// 1400h or 1800h.
+    pub communication: Communication,
+    /// What is mapped; in effect while sub-index 00h is not 0.
+    pub mapping: Mapping<M>,
+    /// What was written to the mapping parameters since sub-index 00h was set to 0.
+    entries: [Mapped; M],
+}
+
+impl<const M: usize> PdoSlot<M> {
+    /// With these parameters.
+    #[must_use]
+    pub fn new(communication: Communication, mapping: Mapping<M>) -> Self {
+        let mut slot = Self { communication, mapping, entries: [Mapped::new(0, 0, 0); M] };
+        slot.entries.iter_mut().zip(mapping.entries()).for_each(|(to, &from)| *to = from);
+        slot
+    }
+
+    fn rpdo(&self) -> RpdoConfig {
+        let Communication { cob_id, transmission, event_timer, .. } = self.communication;
+        let timeout = Duration::from_millis(event_timer.into());
+        // A PDO that maps nothing is not valid.
+        let cob_id = cob_id.with_valid(cob_id.is_valid() && self.mapping.bits() > 0);
+        RpdoConfig { cob_id, transmission, timeout, bytes: self.mapping.bytes() }
+    }
+
+    fn tpdo(&self) -> TpdoConfig {
+        let Communication { cob_id, transmission, inhibit, event_timer, sync_start } = self.communication;
+        TpdoConfig {
+            cob_id: cob_id.with_valid(cob_id.is_valid() && self.mapping.bits() > 0),
+            transmission,
+            inhibit: Duration::from_micros(u64::from(inhibit) * 100),
+            event_timer: Duration::from_millis(event_timer.into()),
+            sync_start,
+        }
+    }
+
+    fn read(&self, at: Parameter) -> Result<Small, AbortCode> {
+        let com = &self.communication;
+        Ok(match (at.mapping, at.sub) {
+            (false, 0) => Small::from(if at.rpdo { 5u8 } else { 6 }),
+            (false, 1) => Small::from(com.cob_id.0),
+            (false, 2) => Small::from(com.transmission.raw()),
+            (false, 3) => Small::from(com.inhibit),
+            (false, 5) => Small::from(com.event_timer),
+            (false, 6) if !at.rpdo => Small::from(com.sync_start),
+            (true, 0) => Small::from(self.mapping.entries().len() as u8),
+            (true, sub) => {
+                let entry = self.entries.get(usize::from(sub) - 1).ok_or(AbortCode::NO_SUB_INDEX)?;
+                Small::from(entry.raw())
+            }
+            _ => return Err(AbortCode::NO_SUB_INDEX),
+        })
+    }
+
+    fn write(&mut self, at: Parameter, value: &[u8], objects: &impl Mappable) -> Result<(), AbortCode> {
+        let valid = self.communication.cob_id.is_valid();
+        let com = &mut self.communication;
+        match (at.mapping, at.sub) {
+            (false, 1) => com.cob_id = checked_cob_id(com.cob_id, CobId(scalar(value)?))?,
+            (false, 2) => {
+                let new = Transmission::new(scalar(value)?).map_err(|_| AbortCode::INVALID_VALUE)?;
+                if at.rpdo && matches!(new, Transmission::RtrSync | Transmission::RtrEvent) {
+                    return Err(AbortCode::INVALID_VALUE);
+                }
+                com.transmission = new;
+            }
+            // The inhibit time and the start value must not change while the PDO is valid.
+            (false, 3) => com.inhibit = unless(valid, scalar(value)?)?,
+            (false, 5) => com.event_timer = scalar(value)?,
+            (false, 6) if !at.rpdo => com.sync_start = unless(valid, scalar(value)?)?,
+            (false, 0) => return Err(AbortCode::READ_ONLY),
+            (false, _) => return Err(AbortCode::NO_SUB_INDEX),
+            (true, _) if valid => return Err(AbortCode::UNSUPPORTED_ACCESS),
+            (true, 0) => {
+                let count = usize::from(scalar::<u8>(value)?);
+                let entries = self.entries.get(..count).ok_or(AbortCode::PDO_LENGTH)?;
+                self.mapping = Mapping::new(entries).map_err(|error| match error {
+                    pdo::mapping::MappingError::NoBits { .. } => AbortCode::NOT_MAPPABLE,
+                    _ => AbortCode::PDO_LENGTH,
+                })?;
+            }
+            (true, sub) => {
+                if !self.mapping.entries().is_empty() {
+                    return Err(AbortCode::UNSUPPORTED_ACCESS);
+                }
+                let slot = self.entries.get_mut(usize::from(sub) - 1).ok_or(AbortCode::NO_SUB_INDEX)?;
+                let entry = Mapped::from_raw(scalar(value)?);
+                objects.check(entry, at.rpdo)?;
+                *slot = entry;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Where a parameter belongs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Parameter {
+    rpdo: bool,
+    mapping: bool,
+    pdo: usize,
+    sub: u8,
+}
+
+impl Parameter {
+    const fn of(at: Address) -> Option<Self> {
+        let (rpdo, mapping) = match at.index {
+            0x1400..=0x15FF => (true, false),
+            0x1600..=0x17FF => (true, true),
+            0x1800..=0x19FF => (false, false),
+            0x1A00..=0x1BFF => (false, true),
+            _ => return None,
+        };
+        Some(Self { rpdo, mapping, pdo: (at.index & 0x1FF) as usize, sub: at.sub })
+    }
+}
+
+fn scalar<T: Scalar>(value: &[u8]) -> Result<T, AbortCode> {
+    T::from_bytes(value).map_err(|error| {
+        if error.found > usize::from(error.expected) { AbortCode::TOO_LONG } else { AbortCode::TOO_SHORT }
+    })
+}
+
+fn unless<T>(forbidden: bool, value: T) -> Result<T, AbortCode> {
+    if forbidden { Err(AbortCode::INVALID_VALUE) } else { Ok(value) }
+}
+
+/// An identifier must not change while the PDO is valid, must have 11 bits and not be restricted.
+fn checked_cob_id(old: CobId, new: CobId) -> Result<CobId, AbortCode> {
+    let id = new.standard_id().ok_or(AbortCode::INVALID_VALUE)?;
+    let changed = old.id() != new.id();
+    let refused = new.is_valid() && (cob::is_restricted(id) || (changed && old.is_valid()));
+    unless(refused, new)
+}
+
+/// Which objects may be mapped.
+trait Mappable {
+    fn check(&self, entry: Mapped, rpdo: bool) -> Result<(), AbortCode>;
+}
+
+impl<H: Hooks> Mappable for Dictionary<'_, H> {
+    fn check(&self, entry: Mapped, rpdo: bool) -> Result<(), AbortCode> {
+        if entry.is_dummy() {
+            let bits = crate::data_type::DataType(entry.at.index).size().map(|bytes| bytes * 8);
+            let fits =
+                entry.at.sub == 0 && (bits == Some(entry.bits) || (entry.at.index, entry.bits) == (1, 1));
+            return if rpdo && fits { Ok(()) } else { Err(AbortCode::NOT_MAPPABLE) };
+        }
+        let object = self.entry(entry.at).ok_or(AbortCode::NO_OBJECT)?;
+        let bits = object.data_type.size().map(|bytes| bytes * 8);
+        let boolean = object.data_type == crate::data_type::DataType::BOOLEAN && entry.bits == 1;
+        let fits = object.is_mappable(rpdo) && (bits == Some(entry.bits) || boolean);
+        if fits { Ok(()) } else { Err(AbortCode::NOT_MAPPABLE) }
+    }
+}
+
+/// `R` RPDOs and `T` TPDOs of up to `M` mapped objects each.
+///
+/// - Input: [`handle_frame`](Self::handle_frame), [`handle_sync`](Self::handle_sync),
+///   [`handle_timeout`](Self::handle_timeout).
+/// - Commands: [`start`](Self::start), [`stop`](Self::stop), [`trigger`](Self::trigger).
+/// - Output: [`poll_transmit`](Self::poll_transmit), [`poll_event`](Self::poll_event),
+///   [`poll_timeout`](Self::poll_timeout).
+///
+/// PDOs live in the NMT state operational only; parameters written meanwhile take effect at once.
+#[derive(Debug, Clone)]
+pub struct Pdos<const R: usize, const T: usize, const M: usize> {
+    rpdo_slots: [PdoSlot<M>; R],
+    tpdo_slots: [PdoSlot<M>; T],
+    rpdos: [Rpdo; R],
+    tpdos: [Tpdo; T],
+    running: bool,
+}
+
+impl<const R: usize, const T: usize, const M: usize> Pdos<R, T, M> {
+    /// With these parameters, not running.
+    #[must_use]
+    pub fn new(rpdo_slots: [PdoSlot<M>; R], tpdo_slots: [PdoSlot<M>; T]) -> Self {
+        let rpdos = rpdo_slots.each_ref().map(|slot| Rpdo::new(slot.rpdo()));
+        let tpdos = tpdo_slots.each_ref().map(|slot| Tpdo::new(slot.tpdo()));
+        Self { rpdo_slots, tpdo_slots, rpdos, tpdos, running: false }
+    }
+
+    /// Parameters of the RPDOs.
+    #[must_use]
+    pub const fn rpdo_slots(&self) -> &[PdoSlot<M>; R] {
+        &self.rpdo_slots
+    }
+
+    /// Parameters of the TPDOs.
+    #[must_use]
+    pub const fn tpdo_slots(&self) -> &[PdoSlot<M>; T] {
+        &self.tpdo_slots
+    }
+
+    /// The node enters the NMT state operational.
+    pub fn start(&mut self) {
+        self.running = true;
+        self.rpdos.iter_mut().zip(&self.rpdo_slots).for_each(|(rpdo, slot)| rpdo.reset(slot.rpdo()));
+        self.tpdos.iter_mut().zip(&self.tpdo_slots).for_each(|(tpdo, slot)| tpdo.reset(slot.tpdo()));
+    }
+
+    /// The node leaves the NMT state operational.
+    pub fn stop(&mut self) {
+        self.running = false;
+    }
+
+    /// Sends TPDO `number` (from 0) soon: its data have changed.
+    pub fn trigger(&mut self, number: usize) {
+        if let Some(tpdo) = self.tpdos.get_mut(number) {
+            tpdo.trigger();
+        }
+    }
+
+    /// Takes a frame from the bus; what an event-driven RPDO brings goes to the dictionary with
+    /// [`poll_event`](Self::poll_event).
+    #[inline]
+    pub fn handle_frame(&mut self, now: Duration, frame: &impl embedded_can::Frame) -> Handled {
+        let taken = self.running
+            && (self.rpdos.iter_mut().any(|rpdo| rpdo.handle_frame(now, frame).is_taken())
+                || self.tpdos.iter_mut().any(|tpdo| tpdo.handle_frame(frame).is_taken()));
+        if taken { Handled::Taken } else { Handled::Ignored }
+    }
+
+    /// A SYNC has come, with its counter if it has one.
+    pub fn handle_sync<H: Hooks>(&mut self, counter: Option<u8>, dictionary: &Dictionary<'_, H>) {
+        if !self.running {
+            return;
+        }
+        self.rpdos.iter_mut().for_each(Rpdo::handle_sync);
+        for (tpdo, slot) in self.tpdos.iter_mut().zip(&self.tpdo_slots) {
+            tpdo.handle_sync(counter, || pack(slot, dictionary));
+        }
+    }
+
+    /// Notices what is missing and what is due; early calls do nothing.
+    pub fn handle_timeout(&mut self, now: Duration) {
+        self.rpdos.iter_mut().for_each(|rpdo| rpdo.handle_timeout(now));
+        self.tpdos.iter_mut().for_each(|tpdo| tpdo.handle_timeout(now));
+    }
+
+    /// When to call [`handle_timeout`](Self::handle_timeout) and
+    /// [`poll_transmit`](Self::poll_transmit); `None` = idle.
+    #[must_use]
+    pub fn poll_timeout(&self) -> Option<Duration> {
+        if !self.running {
+            return None;
+        }
+        let rpdos = self.rpdos.iter().filter_map(Rpdo::poll_timeout);
+        rpdos.chain(self.tpdos.iter().filter_map(Tpdo::poll_timeout)).min()
+    }
+
+    /// The frame to send now, once.
+    pub fn poll_transmit<H: Hooks>(
+        &mut self,
+        now: Duration,
+        dictionary: &Dictionary<'_, H>,
+    ) -> Option<Frame> {
+        if !self.running {
+            return None;
+        }
+        let mut tpdos = self.tpdos.iter_mut().zip(&self.tpdo_slots);
+        tpdos.find_map(|(tpdo, slot)| tpdo.poll_transmit(now, || pack(slot, dictionary)))
+    }
+
+    /// Writes what has come to the dictionary; tells the number (from 0) of the RPDO and what happened,
+    /// until `None`.
+    pub fn poll_event<H: Hooks>(&mut self, dictionary: &mut Dictionary<'_, H>) -> Option<(usize, RpdoEvent)> {
+        for (number, (rpdo, slot)) in self.rpdos.iter_mut().zip(&self.rpdo_slots).enumerate() {
+            let Some(event) = rpdo.poll_event() else { continue };
+            if let RpdoEvent::Data(payload) = event
+                && let Ok(values) = slot.mapping.unpack(payload)
+            {
+                values
+                    .filter(|(entry, _)| !entry.is_dummy())
+                    .for_each(|(entry, bits)| dictionary.set_bits(entry.at, bits.unsigned()));
+            }
+            return Some((number, event));
+        }
+        None
+    }
+
+    fn read(&self, at: Parameter) -> Result<Small, AbortCode> {
+        let slots: &[PdoSlot<M>] = if at.rpdo { &self.rpdo_slots } else { &self.tpdo_slots };
+        slots.get(at.pdo).ok_or(AbortCode::NO_OBJECT)?.read(at)
+    }
+
+    fn write(&mut self, at: Parameter, value: &[u8], objects: &impl Mappable) -> Result<(), AbortCode> {
+        let slots: &mut [PdoSlot<M>] = if at.rpdo { &mut self.rpdo_slots } else { &mut self.tpdo_slots };
+        let slot = slots.get_mut(at.pdo).ok_or(AbortCode::NO_OBJECT)?;
+        slot.write(at, value, objects)?;
+        if at.rpdo {
+            self.rpdos.get_mut(at.pdo).into_iter().for_each(|rpdo| rpdo.reset(slot.rpdo()));
+        } else {
+            self.tpdos.get_mut(at.pdo).into_iter().for_each(|tpdo| tpdo.reset(slot.tpdo()));
+        }
+        Ok(())
+    }
+}
+
+fn pack<const M: usize, H: Hooks>(slot: &PdoSlot<M>, dictionary: &Dictionary<'_, H>) -> Payload {
+    slot.mapping.pack(|entry| dictionary.bits(entry.at))
+}
+
+/// Dictionary and PDO parameters as a server serves them.
+#[derive(Debug)]
+pub struct Objects<'o, 'a, H, const R: usize, const T: usize, const M: usize> {
+    /// Everything but 1400h…1BFFh.
+    pub dictionary: &'o mut Dictionary<'a, H>,
+    /// 1400h…1BFFh.
+    pub pdos: &'o mut Pdos<R, T, M>,
+}
+
+impl<H: Hooks, const R: usize, const T: usize, const M: usize> Access for Objects<'_, '_, H, R, T, M> {
+    #[inline]
+    fn read(&mut self, at: Address, offset: u32, out: &mut [u8]) -> Result<(usize, Total), AbortCode> {
+        match Parameter::of(at) {
+            None => self.dictionary.read(at, offset, out),
+            Some(parameter) => Ok(read_slice(self.pdos.read(parameter)?.as_slice(), offset, out)),
+        }
+    }
+
+    fn begin_write(&mut self, at: Address, size: Option<u32>) -> Result<(), AbortCode> {
+        match Parameter::of(at) {
+            None => self.dictionary.begin_write(at, size),
+            Some(parameter) => self.pdos.read(parameter).map(|_| ()),
+        }
+    }
+
+    fn write(&mut self, at: Address, piece: &Piece<'_>) -> Result<(), AbortCode> {
+        let Some(parameter) = Parameter::of(at) else { return self.dictionary.write(at, piece) };
+        let old = self.pdos.read(parameter)?;
+        if !piece.is_whole() {
+            return Err(AbortCode::TOO_LONG);
+        }
+        // Without indicated size an expedited download brings 4 bytes.
+        let cut = if piece.size.is_none() { piece.data.get(..old.as_slice().len()) } else { None };
+        self.pdos.write(parameter, cut.unwrap_or(piece.data), self.dictionary)
+    }
+
+    fn abandon(&mut self, at: Address) {
+        self.dictionary.abandon(at);
+    }
+}
