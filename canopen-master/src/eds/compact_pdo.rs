@@ -5,7 +5,8 @@ use alloc::string::String;
 use alloc::vec::Vec;
 
 use super::model::{Device, Entry, Object};
-use super::types::{Access, DataType, ObjectType, PdoMapping};
+use super::types::{Access, ObjectType, PdoMapping};
+use crate::data_type::DataType;
 
 /// Sub-objects of a PDO communication parameter: name and type; bit n of `CompactPDO` stands for
 /// sub-index n + 1 (CiA 301, 7.5.2.35 and 7.5.2.37).

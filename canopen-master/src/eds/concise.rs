@@ -8,8 +8,8 @@ use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
 
 use super::model::{Device, Entry};
-use super::types::DataType;
 use super::value::{ValueError, from_bytes};
+use crate::data_type::DataType;
 
 /// One value to write.
 #[derive(Clone, PartialEq, Eq, Debug)]

@@ -27,12 +27,13 @@ use alloc::borrow::Cow;
 use alloc::string::String;
 use alloc::vec::Vec;
 
+pub use crate::data_type::DataType;
 pub use check::check;
 pub use concise::{ConciseEntry, ConciseError, ConciseValueError, encode_concise, parse_concise};
 pub use diagnostic::{Diagnostic, Rule, Severity};
 pub use encoding::Encoding;
 pub use model::{Device, Entry, Fields, Module, Object, Section};
-pub use types::{Access, DataType, List, ObjectType, PdoMapping};
+pub use types::{Access, List, ObjectType, PdoMapping};
 pub use value::{Number, ValueError, fit, from_bytes, to_bytes};
 pub use writer::write_eds;
 pub use xdd::write_xdd;

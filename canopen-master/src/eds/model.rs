@@ -4,8 +4,9 @@ use alloc::borrow::ToOwned;
 use alloc::string::String;
 use alloc::vec::Vec;
 
-use super::types::{Access, DataType, List, ObjectType, PdoMapping};
+use super::types::{Access, List, ObjectType, PdoMapping, length_in_bits};
 use super::value::{Number, ValueError, to_bytes};
+use crate::data_type::DataType;
 
 /// Keys and values in their order; keys compare without regard to case.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
@@ -357,7 +358,7 @@ impl Device {
             let base = Number::parse(definition.default.as_deref()?)?.resolve(None).ok()?;
             u16::try_from(base).ok().map(DataType)
         };
-        if data_type.bits().is_some() { data_type } else { defined().unwrap_or(data_type) }
+        if length_in_bits(data_type).is_some() { data_type } else { defined().unwrap_or(data_type) }
     }
 
     /// `VendorName` of `[DeviceInfo]`.

@@ -11,8 +11,9 @@ use super::ini::Section as Lines;
 use super::model::{Entry, Fields, Object, Section};
 use super::name::Part;
 use super::reader::{Findings, duplicate, indices, repeated, shorten};
-use super::types::{Access, DataType, ObjectType, PdoMapping};
+use super::types::{Access, ObjectType, PdoMapping};
 use super::value::Number;
+use crate::data_type::DataType;
 
 /// Collects the sections of objects, which come in any order.
 #[derive(Default)]

@@ -1,161 +1,75 @@
-//! The code spaces of an object's description: kind, data type, access, PDO mapping.
+//! The code spaces of an object's description: kind, access, PDO mapping, list.
 
 use core::fmt;
+
+use crate::data_type::{DataType, Kind};
 
 /// Kind of an object (CiA 301, 7.4.3, "object code").
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct ObjectType(pub u8);
 
-macro_rules! table {
-    ($name:ident, $kind:literal { $($(#[$doc:meta])* $constant:ident = $value:literal;)* }) => {
-        impl $name {
-            $($(#[$doc])* pub const $constant: Self = Self($value);)*
-
-            /// Every code that has a name, in ascending order.
-            pub const ALL: &'static [Self] = &[$(Self::$constant),*];
-
-            /// The standard's name of the code; `None` for one that it does not name.
-            #[must_use]
-            pub const fn name(self) -> Option<&'static str> {
-                match self.0 {
-                    $($value => Some(stringify!($constant)),)*
-                    _ => None,
-                }
-            }
-        }
-
-        impl fmt::Display for $name {
-            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                match self.name() {
-                    Some(name) => f.write_str(name),
-                    None => write!(f, concat!($kind, " {:X}h"), self.0),
-                }
-            }
-        }
-
-        impl fmt::Debug for $name {
-            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                write!(f, "{self}")
-            }
-        }
-    };
-}
-
-table! { ObjectType, "object type" {
+impl ObjectType {
     /// An object without data fields.
-    NULL = 0;
+    pub const NULL: Self = Self(0);
     /// A large variable amount of data.
-    DOMAIN = 2;
+    pub const DOMAIN: Self = Self(2);
     /// Definition of a data type.
-    DEFTYPE = 5;
+    pub const DEFTYPE: Self = Self(5);
     /// Definition of a record type.
-    DEFSTRUCT = 6;
+    pub const DEFSTRUCT: Self = Self(6);
     /// A single value.
-    VAR = 7;
+    pub const VAR: Self = Self(7);
     /// Fields of one data type; sub-index 0 is their number.
-    ARRAY = 8;
+    pub const ARRAY: Self = Self(8);
     /// Fields of any data types; sub-index 0 is the highest sub-index.
-    RECORD = 9;
-} }
+    pub const RECORD: Self = Self(9);
 
-/// Data type by its index in the object dictionary (CiA 301, 7.4.7.1, table 44).
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct DataType(pub u16);
-
-table! { DataType, "data type" {
-    /// 1 bit.
-    BOOLEAN = 0x01;
-    /// 8 bits, signed.
-    INTEGER8 = 0x02;
-    /// 16 bits, signed.
-    INTEGER16 = 0x03;
-    /// 32 bits, signed.
-    INTEGER32 = 0x04;
-    /// 8 bits.
-    UNSIGNED8 = 0x05;
-    /// 16 bits.
-    UNSIGNED16 = 0x06;
-    /// 32 bits.
-    UNSIGNED32 = 0x07;
-    /// IEEE 754 single.
-    REAL32 = 0x08;
-    /// ASCII text.
-    VISIBLE_STRING = 0x09;
-    /// Bytes.
-    OCTET_STRING = 0x0A;
-    /// UTF-16 text.
-    UNICODE_STRING = 0x0B;
-    /// Milliseconds of the day and days since 1984-01-01, 48 bits.
-    TIME_OF_DAY = 0x0C;
-    /// Milliseconds and days, 48 bits.
-    TIME_DIFFERENCE = 0x0D;
-    /// Application data of any length.
-    DOMAIN = 0x0F;
-    /// 24 bits, signed.
-    INTEGER24 = 0x10;
-    /// IEEE 754 double.
-    REAL64 = 0x11;
-    /// 40 bits, signed.
-    INTEGER40 = 0x12;
-    /// 48 bits, signed.
-    INTEGER48 = 0x13;
-    /// 56 bits, signed.
-    INTEGER56 = 0x14;
-    /// 64 bits, signed.
-    INTEGER64 = 0x15;
-    /// 24 bits.
-    UNSIGNED24 = 0x16;
-    /// 40 bits.
-    UNSIGNED40 = 0x18;
-    /// 48 bits.
-    UNSIGNED48 = 0x19;
-    /// 56 bits.
-    UNSIGNED56 = 0x1A;
-    /// 64 bits.
-    UNSIGNED64 = 0x1B;
-    /// Record: PDO communication parameter.
-    PDO_COMMUNICATION_PARAMETER = 0x20;
-    /// Record: PDO mapping.
-    PDO_MAPPING = 0x21;
-    /// Record: SDO parameter.
-    SDO_PARAMETER = 0x22;
-    /// Record: identity.
-    IDENTITY = 0x23;
-} }
-
-impl DataType {
-    /// Length in bits of an integer or BOOLEAN; `None` for every other type.
+    /// The standard's name of the code; `None` for one that it does not name.
     #[must_use]
-    pub const fn integer_bits(self) -> Option<u8> {
+    pub const fn name(self) -> Option<&'static str> {
         Some(match self {
-            Self::BOOLEAN => 1,
-            Self::INTEGER8 | Self::UNSIGNED8 => 8,
-            Self::INTEGER16 | Self::UNSIGNED16 => 16,
-            Self::INTEGER24 | Self::UNSIGNED24 => 24,
-            Self::INTEGER32 | Self::UNSIGNED32 => 32,
-            Self::INTEGER40 | Self::UNSIGNED40 => 40,
-            Self::INTEGER48 | Self::UNSIGNED48 => 48,
-            Self::INTEGER56 | Self::UNSIGNED56 => 56,
-            Self::INTEGER64 | Self::UNSIGNED64 => 64,
+            Self::NULL => "NULL",
+            Self::DOMAIN => "DOMAIN",
+            Self::DEFTYPE => "DEFTYPE",
+            Self::DEFSTRUCT => "DEFSTRUCT",
+            Self::VAR => "VAR",
+            Self::ARRAY => "ARRAY",
+            Self::RECORD => "RECORD",
             _ => return None,
         })
     }
+}
 
-    /// Length in bits of a type of fixed length; `None` for strings, domains, records.
-    #[must_use]
-    pub const fn bits(self) -> Option<u8> {
-        match self {
-            Self::REAL32 => Some(32),
-            Self::REAL64 => Some(64),
-            Self::TIME_OF_DAY | Self::TIME_DIFFERENCE => Some(48),
-            _ => self.integer_bits(),
+impl fmt::Display for ObjectType {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.name() {
+            Some(name) => f.write_str(name),
+            None => write!(f, "object type {:X}h", self.0),
         }
     }
+}
 
-    /// Whether it is a signed integer.
-    #[must_use]
-    pub const fn is_signed(self) -> bool {
-        matches!(self.0, 0x02..=0x04 | 0x10 | 0x12..=0x15)
+impl fmt::Debug for ObjectType {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, f)
+    }
+}
+
+/// Length in bits of an integer or BOOLEAN; `None` for every other type.
+pub(crate) const fn integer_bits(data_type: DataType) -> Option<u8> {
+    match data_type.kind() {
+        Kind::Boolean => Some(1),
+        Kind::Signed(bytes) | Kind::Unsigned(bytes) => Some(bytes * 8),
+        _ => None,
+    }
+}
+
+/// Length in bits of a type of fixed length, as in a PDO mapping; `None` for strings, domains, records.
+pub(crate) const fn length_in_bits(data_type: DataType) -> Option<u8> {
+    match (data_type.kind(), data_type.size()) {
+        (Kind::Boolean, _) => Some(1),
+        (_, Some(bytes)) => Some(bytes * 8),
+        _ => None,
     }
 }
 

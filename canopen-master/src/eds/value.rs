@@ -3,7 +3,8 @@
 use alloc::string::String;
 use alloc::vec::Vec;
 
-use super::types::DataType;
+use super::types::integer_bits;
+use crate::data_type::{DataType, Kind};
 
 /// Why a text is not a value.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
@@ -124,7 +125,7 @@ fn radix(digits: &str, radix: u32) -> Option<i128> {
 /// # Errors
 /// See [`ValueError`].
 pub fn to_bytes(text: &str, data_type: DataType, node_id: Option<u8>) -> Result<Vec<u8>, ValueError> {
-    if let Some(bits) = data_type.integer_bits() {
+    if let Some(bits) = integer_bits(data_type) {
         let number = if text.is_empty() {
             0
         } else {
@@ -165,9 +166,9 @@ pub fn to_bytes(text: &str, data_type: DataType, node_id: Option<u8>) -> Result<
 /// where it does not fit.
 #[must_use]
 pub fn fit(number: i128, data_type: DataType) -> Option<i128> {
-    let bits = u32::from(data_type.integer_bits()?);
+    let bits = u32::from(integer_bits(data_type)?);
     let span = 1_i128 << bits;
-    if !data_type.is_signed() {
+    if !matches!(data_type.kind(), Kind::Signed(_)) {
         return (0..span).contains(&number).then_some(number);
     }
     let half = span >> 1;
@@ -216,8 +217,8 @@ pub fn from_bytes(bytes: &[u8], data_type: DataType) -> String {
         (DataType::REAL64, Some(bits)) if bytes.len() == 8 => {
             alloc::format!("{}", f64::from_bits(bits as u64))
         }
-        (_, Some(number)) if data_type.integer_bits().is_some() => match fit(number, data_type) {
-            Some(value) if data_type.is_signed() => alloc::format!("{value}"),
+        (_, Some(number)) if integer_bits(data_type).is_some() => match fit(number, data_type) {
+            Some(value) if matches!(data_type.kind(), Kind::Signed(_)) => alloc::format!("{value}"),
             _ => alloc::format!("0x{number:0width$X}", width = bytes.len() * 2),
         },
         _ => bytes.iter().map(|byte| alloc::format!("{byte:02X}")).collect(),

@@ -7,9 +7,10 @@ use super::super::diagnostic::Rule;
 use super::super::model::{Device, Entry, Object};
 use super::super::objects::KEYS;
 use super::super::reader::{Findings, shorten};
-use super::super::types::{DataType, List, ObjectType};
+use super::super::types::{List, ObjectType, integer_bits};
 use super::super::value::{Number, ValueError, fit, to_bytes};
 use super::Places;
+use crate::data_type::DataType;
 
 /// Longest `ParameterName`.
 const NAME_LENGTH: usize = 241;
@@ -186,7 +187,7 @@ impl Scope<'_> {
                 return None;
             }
         }
-        data_type.integer_bits()?;
+        integer_bits(data_type)?;
         let number = Number::parse(text)?;
         if number.node_id && !number.clean {
             let message = format!("{key}=\"{}\" is to be written $NODEID+number", shorten(text));

@@ -5,9 +5,10 @@ use alloc::format;
 use super::super::diagnostic::Rule;
 use super::super::model::{Device, Entry, Object};
 use super::super::reader::Findings;
-use super::super::types::{Access, DataType, PdoMapping};
+use super::super::types::{Access, PdoMapping, length_in_bits};
 use super::super::value::Number;
 use super::Places;
+use crate::data_type::DataType;
 
 /// Bits of a PDO.
 const PDO_BITS: u32 = 64;
@@ -56,7 +57,7 @@ fn one(device: &Device, mapped: u32, receive: bool) -> Result<(), alloc::string:
     let index = u16::from_be_bytes([high, low]);
     if index < 0x20 {
         let dummy = DataType(index);
-        return match dummy.bits() {
+        return match length_in_bits(dummy) {
             _ if !receive => Err(format!("the dummy {dummy} goes into RPDOs only")),
             Some(length) if length != bits => Err(format!("{dummy} has {length} bits")),
             Some(_) if device.dummies().any(|allowed| allowed == dummy) => Ok(()),
@@ -82,7 +83,7 @@ fn one(device: &Device, mapped: u32, receive: bool) -> Result<(), alloc::string:
     if let Some(direction) = direction {
         return Err(format!("it can be mapped {direction}"));
     }
-    let length = entry.data_type.and_then(|data_type| device.base_type(data_type).bits());
+    let length = entry.data_type.and_then(|data_type| length_in_bits(device.base_type(data_type)));
     match length {
         Some(length) if length != bits => Err(format!("it has {length} bits")),
         _ => Ok(()),

@@ -8,7 +8,8 @@ mod reader;
 mod update;
 mod writer;
 
-use super::types::{Access, DataType};
+use super::types::Access;
+use crate::data_type::DataType;
 
 pub(crate) use reader::{lines, read};
 pub(crate) use update::update;

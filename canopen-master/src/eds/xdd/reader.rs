@@ -13,9 +13,10 @@ use super::super::diagnostic::Rule;
 use super::super::model::{Device, Entry, Fields, Object};
 use super::super::objects::KEYS;
 use super::super::reader::{Findings, shorten};
-use super::super::types::{Access, DataType, ObjectType, PdoMapping};
+use super::super::types::{Access, ObjectType, PdoMapping};
 use super::super::value::Number;
 use super::{ACCESS, COMMISSIONING, FILE_INFO, GENERAL, IDENTITY, Kind, MASTER, Row, TYPES};
+use crate::data_type::DataType;
 
 /// Whether an element has this name, in any namespace.
 pub(super) fn is(node: Node<'_, '_>, name: &str) -> bool {
