@@ -74,6 +74,11 @@ pub(crate) enum Command {
     },
     /// Captures to words, or to JSON objects one a line
     Decode(crate::decode::cli::Decode),
+    /// EDS, DCF, XDD and XDC files
+    Eds {
+        #[command(subcommand)]
+        command: crate::eds::cli::Eds,
+    },
     /// Completions for a shell
     Completions { shell: clap_complete::Shell },
     /// The manual page

@@ -11,6 +11,7 @@ mod cli;
 mod connect;
 mod decode;
 mod demo;
+mod eds;
 mod exit;
 mod image;
 mod lb2;
@@ -34,6 +35,7 @@ fn main() -> ExitCode {
         Command::Lb2 { command } => lb2::run(&out, &cli.global, &command),
         Command::Params { command } => params::run(&out, &cli.global, &command),
         Command::Decode(args) => decode::run(&out, &args),
+        Command::Eds { command } => eds::run(&out, cli.global.dry_run, &command),
         Command::Completions { shell } => {
             clap_complete::generate(shell, &mut Cli::command(), "motionctl", &mut std::io::stdout());
             Ok(())

@@ -2,6 +2,7 @@
 
 use core::cell::RefCell;
 use std::io::{IsTerminal, Write};
+use std::path::Path;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
@@ -99,4 +100,26 @@ impl Output {
             _ => Err(Exit::check("not done")),
         }
     }
+}
+
+/// Writes to standard output. That nobody reads to the end, as with `| head`, is no trouble.
+pub(crate) fn put(text: &str) {
+    let mut stdout = std::io::stdout().lock();
+    let _ = stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush());
+}
+
+/// Writes a file beside its place and moves it there, so that an older one is never half overwritten.
+pub(crate) fn write_beside(path: &Path, bytes: &[u8]) -> Result<(), Exit> {
+    let name = path.display().to_string();
+    let trouble = |error: &dyn core::fmt::Display| Exit::file(&name, error);
+    let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut file = tempfile::NamedTempFile::new_in(directory).map_err(|error| trouble(&error))?;
+    file.write_all(bytes).map_err(|error| trouble(&error))?;
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        let _ = file.as_file().set_permissions(std::fs::Permissions::from_mode(0o644));
+    }
+    file.persist(path).map_err(|error| trouble(&error))?;
+    Ok(())
 }

@@ -29,7 +29,7 @@ const BOM: &[u8] = b"\xEF\xBB\xBF";
 impl Encoding {
     /// What the file most probably is: UTF-8 if it is valid UTF-8; otherwise an MS-DOS code page if
     /// more of the bytes above 7Fh beside letters are in 80h…9Fh (letters there, punctuation in
-    /// Windows-1252) than in C0h…FFh (the other way round), else Windows-1252.
+    /// Windows-1252) than in C0h…FFh (the other way round), else Windows-1252, as for XML.
     #[must_use]
     pub fn detect(bytes: &[u8]) -> Self {
         if bytes.is_ascii() {
@@ -37,6 +37,9 @@ impl Encoding {
         }
         if core::str::from_utf8(bytes).is_ok() {
             return if bytes.starts_with(BOM) { Self::Utf8Bom } else { Self::Utf8 };
+        }
+        if bytes.starts_with(b"<?xml") {
+            return Self::Windows1252;
         }
         let (mut dos, mut windows) = (0_u32, 0_u32);
         for window in bytes.windows(2) {

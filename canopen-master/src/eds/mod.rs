@@ -85,10 +85,15 @@ impl Reading {
 }
 
 impl Source {
-    /// The bytes of a text in this file's encoding; in UTF-8 where that lacks a character.
+    /// The bytes of a text in this file's encoding; in UTF-8 where that lacks a character, and where
+    /// the text is XML that says so.
     #[must_use]
     pub fn encode(&self, text: &str) -> Vec<u8> {
-        self.encoding.encode(text).unwrap_or_else(|| text.as_bytes().to_vec())
+        let declaration = text.split_once("?>").map_or("", |(declaration, _)| declaration);
+        let utf8 = declaration.starts_with("<?xml") && declaration.to_ascii_lowercase().contains("utf-8");
+        let encoding =
+            if utf8 && self.encoding != Encoding::Utf8Bom { Encoding::Utf8 } else { self.encoding };
+        encoding.encode(text).unwrap_or_else(|| text.as_bytes().to_vec())
     }
 }
 

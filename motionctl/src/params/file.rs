@@ -81,17 +81,7 @@ pub(crate) fn write(path: &Path, backup: &Backup, changed: bool) -> Result<usize
             }
         };
     }
-    // Written beside and moved, so that an older backup is never half overwritten.
-    let name = path.display().to_string();
-    let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut file = tempfile::NamedTempFile::new_in(directory).map_err(|error| Exit::file(&name, &error))?;
-    std::io::Write::write_all(&mut file, text.as_bytes()).map_err(|error| Exit::file(&name, &error))?;
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        let _ = file.as_file().set_permissions(std::fs::Permissions::from_mode(0o644));
-    }
-    file.persist(path).map_err(|error| Exit::file(&name, &error))?;
+    crate::output::write_beside(path, text.as_bytes())?;
     Ok(count)
 }
 

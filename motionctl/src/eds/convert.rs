@@ -1,0 +1,143 @@
+//! `eds convert`: the same device in another format, or configured.
+
+use std::io::Write;
+use std::path::Path;
+
+use canopen_master::eds::{self, Device, Format, Reading};
+use serde_json::json;
+
+use super::cli::{Input, Kind};
+use super::{bytes, place, read};
+use crate::exit::Exit;
+use crate::output::Output;
+
+pub(super) struct Changes<'a> {
+    pub(super) node: Option<u8>,
+    pub(super) bit_rate: Option<u16>,
+    pub(super) values: &'a [String],
+    pub(super) concise: Option<&'a Path>,
+    pub(super) anew: bool,
+}
+
+pub(super) fn run(
+    out: &Output,
+    dry_run: bool,
+    input: &Input,
+    output: &Path,
+    to: Option<Kind>,
+    changes: &Changes<'_>,
+) -> Result<(), Exit> {
+    let kind = to.or_else(|| Kind::of(output)).ok_or_else(|| {
+        let name = output.display();
+        Exit::usage(format!("what shall {name} be? Name it .eds, .dcf, .xdd, .xdc or .bin, or say --to KIND"))
+    })?;
+    let reading = read(input)?;
+    if !reading.diagnostics.is_empty() {
+        out.remark(super::doubts(&reading));
+    }
+    let mut device = reading.device.clone();
+    configure(out, &mut device, changes)?;
+    if !kind.is_configuration() && device.is_configuration() {
+        unconfigure(out, &mut device);
+    }
+    let (written, lost) = render(&reading, &device, kind, changes)?;
+    for what in &lost {
+        out.remark(format!("not carried over: {what}"));
+    }
+    let (objects, entries) = super::counts(&device);
+    let name = output.display().to_string();
+    let to_stdout = output.as_os_str() == "-";
+    if !dry_run {
+        if to_stdout {
+            std::io::stdout().write_all(&written).map_err(|error| Exit::file("standard output", &error))?;
+            return Ok(());
+        }
+        crate::output::write_beside(output, &written)?;
+    }
+    let document = json!({
+        "file": input.file.display().to_string(), "output": name, "objects": objects, "entries": entries,
+        "bytes": written.len(), "lost": lost, "written": !dry_run,
+    });
+    out.document(document, || {
+        let verb = if dry_run { "would write" } else { "written" };
+        println!("{name}: {verb}, {objects} objects, {entries} entries, {} bytes", written.len());
+    });
+    Ok(())
+}
+
+fn configure(out: &Output, device: &mut Device, changes: &Changes<'_>) -> Result<(), Exit> {
+    if let Some(node) = changes.node {
+        device.commissioning.set("NodeID", node.to_string());
+    }
+    if let Some(rate) = changes.bit_rate {
+        device.commissioning.set("Baudrate", rate.to_string());
+    }
+    if let Some(path) = changes.concise {
+        let name = path.display().to_string();
+        let entries = eds::parse_concise(&bytes(path)?).map_err(|error| Exit::file(&name, &error))?;
+        for entry in device.apply_concise(&entries) {
+            out.remark(format!("{name}: {:04X}h:{:02X} is not in the file", entry.index, entry.subindex));
+        }
+    }
+    for text in changes.values {
+        let (object, value) =
+            text.split_once('=').ok_or_else(|| Exit::usage(format!("\"{text}\" is not OBJECT=VALUE")))?;
+        let (index, subindex) = place(device, object)?;
+        let node = device.node_id();
+        let base = device.entry(index, subindex.unwrap_or(0)).and_then(|entry| entry.data_type);
+        let base = base.map(|data_type| device.base_type(data_type));
+        let entry = device
+            .object_mut(index)
+            .and_then(|found| found.entry_mut(subindex.unwrap_or(0)))
+            .ok_or_else(|| Exit::usage(format!("{object} is not in the file")))?;
+        if let Some(base) = base {
+            // Any node ID shows whether the rest is well-formed.
+            eds::to_bytes(value, base, node.or(Some(1)))
+                .map_err(|error| Exit::usage(format!("{object}=\"{value}\": {error}")))?;
+        }
+        entry.value = Some(value.to_owned());
+    }
+    Ok(())
+}
+
+/// An EDS describes every device of its kind: what is configured in one does not belong there.
+fn unconfigure(out: &Output, device: &mut Device) {
+    let mut count = 0;
+    for object in &mut device.objects {
+        for entry in core::iter::once(&mut object.own).chain(&mut object.subs) {
+            count += usize::from(entry.value.take().is_some());
+            entry.denotation = None;
+            entry.ref_name = None;
+        }
+    }
+    device.commissioning = eds::Fields::default();
+    out.remark(format!(
+        "{count} configured values and the node's settings are left out: a description has none"
+    ));
+}
+
+fn render(
+    reading: &Reading,
+    device: &Device,
+    kind: Kind,
+    changes: &Changes<'_>,
+) -> Result<(Vec<u8>, Vec<String>), Exit> {
+    let format = match kind {
+        Kind::Eds | Kind::Dcf => Format::Eds,
+        Kind::Xdd | Kind::Xdc => Format::Xdd,
+        Kind::Concise => {
+            let entries = device.to_concise(None).map_err(|error| Exit::check(error.to_string()))?;
+            return Ok((eds::encode_concise(&entries), Vec::new()));
+        }
+    };
+    if format == reading.source.format && !changes.anew {
+        return Ok((reading.source.encode(&reading.update(device)), Vec::new()));
+    }
+    Ok(match format {
+        Format::Eds => (reading.source.encode(&eds::write_eds(device)), Vec::new()),
+        Format::Xdd => {
+            let (text, lost) = eds::write_xdd(device);
+            (text.into_bytes(), lost)
+        }
+    })
+}

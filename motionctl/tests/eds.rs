@@ -1,0 +1,97 @@
+//! `eds check|show|convert` as people run it.
+
+#[allow(dead_code, reason = "what other tests use")]
+mod common;
+
+use common::Bench;
+
+const EDS: &str = "; hand made\r\n[FileInfo]\r\nFileName=a.eds\r\n[DeviceInfo]\r\nVendorName=V\r\nBaudRate_500=1\r\n\
+    [MandatoryObjects]\r\nSupportedObjects=2\r\n1=0x1000\r\n2=0x1001\r\n\
+    [1000]\r\nParameterName=Device type\r\nDataType=7\r\nAccessType=ro\r\nDefaultValue=0x191\r\n\
+    [1001]\r\nParameterName=Error register\r\nDataType=5\r\nAccessType=ro ; odd\r\n\
+    [OptionalObjects]\r\nSupportedObjects=2\r\n1=0x1017\r\n2=0x1800\r\n\
+    [1017]\r\nParameterName=Heartbeat\r\nDataType=6\r\nAccessType=rw\r\nDefaultValue=0\r\n\
+    [1800]\r\nParameterName=TPDO\r\nObjectType=9\r\nSubNumber=1\r\n\
+    [1800sub1]\r\nParameterName=COB-ID\r\nDataType=7\r\nAccessType=rw\r\nDefaultValue=$NODEID+0x180\r\n\
+    [ManufacturerObjects]\r\nSupportedObjects=0\r\n";
+
+fn bench() -> Bench {
+    let bench = Bench::new();
+    std::fs::write(bench.path("a.eds"), EDS).unwrap();
+    bench
+}
+
+#[test]
+fn check_names_line_and_clause() {
+    let bench = bench();
+    let json = bench.run(&["--json", "eds", "check", "a.eds"]).ends(1).json();
+    assert_eq!(json["format"], "EDS");
+    assert_eq!(json["objects"], 4);
+    let odd = json["diagnostics"].as_array().unwrap().iter().find(|d| d["rule"] == "spelling").unwrap();
+    assert_eq!(odd["line"], 19);
+    assert_eq!(odd["severity"], "warning");
+    assert_eq!(odd["clause"], "CiA 306-1, 6.3");
+    bench
+        .run(&["eds", "check", "a.eds"])
+        .ends(1)
+        .says("a.eds:19: warning: AccessType=\"ro ; odd\" is taken as ro");
+    let lenient = bench.run(&["--json", "eds", "check", "--lenient", "a.eds"]).ends(1).json();
+    assert_eq!(lenient["diagnostics"].as_array().unwrap().len(), 1, "{lenient}");
+
+    std::fs::write(bench.path("b.eds"), "what is this\n").unwrap();
+    bench.run(&["eds", "check", "b.eds"]).ends(1).says("no device description: no section of an object");
+    bench.run(&["eds", "check", "absent.eds"]).ends(5);
+}
+
+#[test]
+fn show_resolves_the_node_id() {
+    let bench = bench();
+    bench.run(&["eds", "show", "a.eds", "--node", "5"]).ends(0).says("default $NODEID+0x180 (0x185)");
+    let json =
+        bench.run(&["--json", "eds", "show", "a.eds", "Heartbeat", "1800h:1", "--node", "5"]).ends(0).json();
+    let objects = json["objects"].as_array().unwrap();
+    assert_eq!(objects.len(), 2);
+    assert_eq!(objects[0]["entries"][0]["data_type"], "UNSIGNED16");
+    assert_eq!(objects[1]["entries"][0]["data"], "85010000");
+    bench.run(&["eds", "show", "a.eds", "0x2000"]).ends(1).says("0x2000 is not in a.eds");
+    bench.run(&["eds", "show", "a.eds", "Herzschlag"]).ends(2);
+}
+
+#[test]
+fn convert_changes_what_it_is_told_and_nothing_else() {
+    let bench = bench();
+    bench.run(&["eds", "convert", "a.eds", "same.eds"]).ends(0);
+    assert_eq!(std::fs::read_to_string(bench.path("same.eds")).unwrap(), EDS);
+
+    let set =
+        ["eds", "convert", "a.eds", "a.dcf", "--node", "5", "--bit-rate", "500", "--set", "Heartbeat=1000"];
+    bench.run(&set).ends(0);
+    let dcf = std::fs::read_to_string(bench.path("a.dcf")).unwrap();
+    let expected = EDS
+        .replace(
+            "BaudRate_500=1\r\n",
+            "BaudRate_500=1\r\n[DeviceComissioning]\r\nNodeID=5\r\nBaudrate=500\r\n\r\n",
+        )
+        .replace(
+            "AccessType=rw\r\nDefaultValue=0\r\n",
+            "AccessType=rw\r\nDefaultValue=0\r\nParameterValue=1000\r\n",
+        );
+    assert_eq!(dcf, expected);
+
+    bench.run(&["eds", "convert", "a.dcf", "a.bin"]).ends(0);
+    let concise = std::fs::read(bench.path("a.bin")).unwrap();
+    assert_eq!(concise, [1, 0, 0, 0, 0x17, 0x10, 0, 2, 0, 0, 0, 0xE8, 0x03]);
+    bench.run(&["eds", "convert", "a.eds", "b.xdc", "--concise", "a.bin", "--node", "5"]).ends(0);
+    bench.run(&["eds", "show", "b.xdc", "0x1017"]).ends(0).says("= 0x03E8");
+
+    bench.run(&["eds", "convert", "a.dcf", "back.eds"]).ends(0).says("1 configured values");
+    assert_eq!(std::fs::read_to_string(bench.path("back.eds")).unwrap(), EDS);
+
+    bench.run(&["--dry-run", "eds", "convert", "a.eds", "dry.xdd"]).ends(0).says("would write");
+    assert!(!bench.path("dry.xdd").exists());
+    bench.run(&["eds", "convert", "a.eds", "x", "--node", "5"]).ends(2).says("--to KIND");
+    bench
+        .run(&["eds", "convert", "a.eds", "x.dcf", "--set", "Heartbeat=100000"])
+        .ends(2)
+        .says("out of range");
+}
