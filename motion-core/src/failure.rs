@@ -45,11 +45,12 @@ pub const fn text(failure: Failure) -> Option<&'static str> {
 pub struct FailureLog {
     stored: [StoredFailure; MAX_FAILURES],
     count: usize,
+    total: u32,
 }
 
 impl Default for FailureLog {
     fn default() -> Self {
-        Self { stored: [StoredFailure { axis: 0, failure: Failure(0) }; MAX_FAILURES], count: 0 }
+        Self { stored: [StoredFailure { axis: 0, failure: Failure(0) }; MAX_FAILURES], count: 0, total: 0 }
     }
 }
 
@@ -62,6 +63,7 @@ impl FailureLog {
 
     /// Adds one.
     pub fn store(&mut self, failure: StoredFailure) {
+        self.total = self.total.wrapping_add(1);
         if self.count == MAX_FAILURES {
             self.stored.rotate_left(1);
             self.count -= 1;
@@ -70,6 +72,12 @@ impl FailureLog {
             *slot = failure;
             self.count += 1;
         }
+    }
+
+    /// How many were ever added since switching on, for those who watch for new ones; wraps.
+    #[must_use]
+    pub const fn total(&self) -> u32 {
+        self.total
     }
 
     /// Deletes all; how many there were.

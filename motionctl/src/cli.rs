@@ -53,6 +53,8 @@ pub(crate) enum Color {
 pub(crate) enum Command {
     /// The application example of manual A 6.11 on a virtual controller, end to end
     Demo,
+    /// A soft MotionController: LB2 on its serial endpoints, axes, program, until stopped
+    Run(crate::run::cli::Run),
     /// One virtual device on the named endpoints
     Sim {
         #[command(subcommand)]

@@ -17,7 +17,9 @@ mod image;
 mod lb2;
 mod output;
 mod params;
+mod run;
 mod sim;
+mod storage;
 
 use std::process::ExitCode;
 
@@ -29,6 +31,7 @@ fn main() -> ExitCode {
     let out = output::Output::new(&cli.global);
     let done = match cli.command {
         Command::Demo => demo::run(&out),
+        Command::Run(arguments) => run::run(&out, &arguments),
         Command::Sim { command } => sim::run(&out, &command),
         Command::Bus(arguments) => can::bus::run(&out, &arguments),
         Command::Ports => ports(&out),

@@ -2,23 +2,21 @@
 
 use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
-use std::fs::File;
-use std::io::{Read, Seek, SeekFrom, Write};
-use std::path::Path;
-use std::sync::Arc;
 
 use lb2::device::Device;
 use lb2::telegram::BANK_LEN;
-use motion_core::storage::{Storage, StorageError};
+use motion_core::storage::Storage;
 use motion_core::{Controller, Model, STORAGE_LEN};
 use motion_io::endpoint::Endpoint;
 use motion_io::lb2::serve;
 use motion_io::port::{Role, open};
 use serde_json::json;
 
+use crate::can::stop_flag;
 use crate::cli::Sim;
 use crate::exit::Exit;
 use crate::output::Output;
+use crate::storage::FileStorage;
 
 pub(crate) fn run(out: &Output, command: &Sim) -> Result<(), Exit> {
     let Sim::Controller { model, serial, state, device } = command;
@@ -26,10 +24,7 @@ pub(crate) fn run(out: &Output, command: &Sim) -> Result<(), Exit> {
         .ok_or_else(|| Exit::usage(format!("--model {model}: 8230, 8231, 8235 or 8236 expected")))?;
     let endpoint: Endpoint =
         serial.parse().map_err(|error: motion_io::endpoint::EndpointError| Exit::usage(error.to_string()))?;
-    let stop = Arc::new(AtomicBool::new(false));
-    let flag = Arc::clone(&stop);
-    ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed))
-        .map_err(|error| Exit::trouble(error.to_string()))?;
+    let stop = stop_flag()?;
     match state {
         Some(path) => {
             let storage =
@@ -73,41 +68,5 @@ fn controller(
     match trouble.or(retained.err()) {
         Some(error) => Err(Exit::trouble(error.to_string())),
         None => Ok(()),
-    }
-}
-
-/// Non-volatile memory in a file, which no other program may use meanwhile.
-struct FileStorage(File);
-
-impl FileStorage {
-    fn open(path: &Path) -> std::io::Result<Self> {
-        let file = File::options().read(true).write(true).create(true).truncate(false).open(path)?;
-        file.try_lock().map_err(|_| std::io::Error::other("in use by another program"))?;
-        let len = file.metadata()?.len();
-        let missing = (STORAGE_LEN as u64).saturating_sub(len) as usize;
-        (&file).seek(SeekFrom::End(0))?;
-        (&file).write_all(&vec![0xFF; missing])?;
-        file.sync_all()?;
-        Ok(Self(file))
-    }
-}
-
-impl Storage for FileStorage {
-    fn read(&self, offset: usize, out: &mut [u8]) -> Result<(), StorageError> {
-        let mut file = &self.0;
-        file.seek(SeekFrom::Start(offset as u64))
-            .and_then(|_| file.read_exact(out))
-            .map_err(|_| StorageError { offset })
-    }
-
-    fn write(&mut self, offset: usize, data: &[u8]) -> Result<(), StorageError> {
-        self.0
-            .seek(SeekFrom::Start(offset as u64))
-            .and_then(|_| self.0.write_all(data))
-            .map_err(|_| StorageError { offset })
-    }
-
-    fn sync(&mut self) -> Result<(), StorageError> {
-        self.0.sync_data().map_err(|_| StorageError { offset: 0 })
     }
 }

@@ -238,6 +238,12 @@ impl<S: Storage, R: AsRef<[u8]> + AsMut<[u8]>> Controller<S, R> {
         self.control.access(axis)
     }
 
+    /// The stored failures (4.3.4.2).
+    #[must_use]
+    pub const fn failures(&self) -> &FailureLog {
+        &self.failures
+    }
+
     /// Values of the actual value inputs in the last cycle.
     #[must_use]
     pub const fn actual_values(&self) -> &[ActualValue; AXES as usize] {

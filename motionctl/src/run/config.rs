@@ -1,0 +1,383 @@
+//! `CONFIG.toml` of `motionctl run`.
+
+use core::time::Duration;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use motion_core::Model;
+use motion_core::parameters::{Values, find};
+use motion_io::endpoint::{CanEndpoint, Endpoint};
+use serde::Deserialize;
+
+use crate::exit::Exit;
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Config {
+    #[serde(default)]
+    pub(super) controller: ControllerSection,
+    #[serde(default)]
+    pub(super) serial: Vec<Serial>,
+    pub(super) can1: Option<Can>,
+    pub(super) can2: Option<Can>,
+    #[serde(default)]
+    parameters: BTreeMap<String, Setting>,
+    #[serde(default)]
+    pub(super) simulate: Vec<Simulated>,
+    #[serde(default)]
+    pub(super) program: Vec<Step>,
+}
+
+/// A parameter's value: in display units, as LB2 has it without the decimal point, or as people write it.
+#[derive(Debug, Deserialize)]
+#[serde(untagged, expecting = "a parameter is a whole number in display units, or a text")]
+enum Setting {
+    Number(i32),
+    Text(String),
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ControllerSection {
+    #[serde(default = "model")]
+    model: u16,
+    pub(super) device_number: Option<u8>,
+    /// Directory for flash and retained values.
+    pub(super) state: Option<PathBuf>,
+}
+
+impl Default for ControllerSection {
+    fn default() -> Self {
+        Self { model: model(), device_number: None, state: None }
+    }
+}
+
+const fn model() -> u16 {
+    8230
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+pub(super) enum ComPort {
+    #[serde(rename = "COM 1")]
+    Com1,
+    #[serde(rename = "COM 2")]
+    Com2,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+pub(super) enum Protocol {
+    #[serde(rename = "lb2")]
+    Lb2,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Serial {
+    pub(super) port: ComPort,
+    endpoint: String,
+    #[serde(rename = "protocol")]
+    _protocol: Protocol,
+}
+
+impl Serial {
+    pub(super) fn endpoint(&self) -> Result<Endpoint, Exit> {
+        self.endpoint.parse().map_err(|error| Exit::usage(format!("endpoint {:?}: {error}", self.endpoint)))
+    }
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Can {
+    endpoint: String,
+    #[serde(default = "bitrate")]
+    pub(super) bitrate: u32,
+}
+
+const fn bitrate() -> u32 {
+    500_000
+}
+
+impl Can {
+    pub(super) fn endpoint(&self) -> Result<CanEndpoint, Exit> {
+        self.endpoint.parse().map_err(|error| Exit::usage(format!("endpoint {:?}: {error}", self.endpoint)))
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum BusName {
+    Can1,
+    Can2,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(tag = "kind", rename_all = "lowercase", deny_unknown_fields)]
+pub(super) enum Simulated {
+    /// A servo drive LD 2000 on a virtual bus.
+    Drive { bus: BusName, node: u8 },
+    /// A remote I/O node on a virtual bus.
+    Io { bus: BusName, node: u8 },
+    /// A machine axis on the terminals.
+    Plant(PlantSection),
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum DriveKind {
+    FirstOrder,
+    SecondOrder,
+    Servo,
+    Hydraulic,
+    Stepper,
+    TwoSpeed,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct PlantSection {
+    /// Blocks Qx and Ex, 1…3.
+    pub(super) block: usize,
+    pub(super) drive: DriveKind,
+    /// Units per second at full demand; fast jog of two-speed drives.
+    pub(super) speed: f64,
+    /// Slow jog of two-speed drives.
+    #[serde(default)]
+    pub(super) slow: f64,
+    /// Time constant, s.
+    #[serde(default = "tau")]
+    pub(super) tau: f64,
+    /// Units a step, of stepper motors.
+    #[serde(default = "one")]
+    pub(super) step: f64,
+    /// Encoder edges a unit.
+    #[serde(default = "one")]
+    pub(super) edges: f64,
+    /// Edge of the reference mark, and edges from one to the next.
+    #[serde(default)]
+    pub(super) mark: i64,
+    #[serde(default)]
+    pub(super) every: u32,
+    #[serde(default)]
+    pub(super) limits: Vec<LimitSection>,
+}
+
+const fn tau() -> f64 {
+    0.01
+}
+
+const fn one() -> f64 {
+    1.0
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct LimitSection {
+    /// As "I2.3".
+    pub(super) input: String,
+    pub(super) position: f64,
+    pub(super) upper: bool,
+    /// Low while operated.
+    #[serde(default)]
+    pub(super) opener: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum Action {
+    Power,
+    Home,
+    MoveAbsolute,
+    MoveRelative,
+    MoveVelocity,
+    Jog,
+    Stop,
+    Halt,
+    Reset,
+    SetPosition,
+}
+
+impl Action {
+    pub(super) const fn name(self) -> &'static str {
+        match self {
+            Self::Power => "power",
+            Self::Home => "home",
+            Self::MoveAbsolute => "move-absolute",
+            Self::MoveRelative => "move-relative",
+            Self::MoveVelocity => "move-velocity",
+            Self::Jog => "jog",
+            Self::Stop => "stop",
+            Self::Halt => "halt",
+            Self::Reset => "reset",
+            Self::SetPosition => "set-position",
+        }
+    }
+}
+
+/// One step of the program.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Step {
+    /// Seconds since the start.
+    pub(super) at: f64,
+    #[serde(rename = "do")]
+    pub(super) action: Action,
+    pub(super) axis: u8,
+    pub(super) position: Option<i32>,
+    pub(super) distance: Option<i32>,
+    pub(super) velocity: Option<i32>,
+    /// Of jog: direction and speed.
+    #[serde(default = "yes")]
+    pub(super) forward: bool,
+    #[serde(default)]
+    pub(super) fast: bool,
+    /// Of power: on or off.
+    #[serde(default = "yes")]
+    pub(super) on: bool,
+    /// Seconds that jog, stop or a velocity is held.
+    #[serde(rename = "for")]
+    pub(super) duration: Option<f64>,
+}
+
+const fn yes() -> bool {
+    true
+}
+
+impl Config {
+    pub(super) fn read(path: &Path) -> Result<Self, Exit> {
+        let name = path.display().to_string();
+        let text = std::fs::read_to_string(path).map_err(|error| Exit::file(&name, &error))?;
+        let config: Self =
+            toml_edit::de::from_str(&text).map_err(|error| Exit::usage(format!("{name}: {error}")))?;
+        config.check().map_err(|exit| exit.context(&name))?;
+        Ok(config)
+    }
+
+    pub(super) fn model(&self) -> Result<Model, Exit> {
+        let number = self.controller.model;
+        Model::from_number(number)
+            .ok_or_else(|| Exit::usage(format!("model {number}: 8230, 8231, 8235 or 8236 expected")))
+    }
+
+    fn check(&self) -> Result<(), Exit> {
+        self.model()?;
+        for step in &self.program {
+            step.check()?;
+        }
+        for device in &self.simulate {
+            match device {
+                Simulated::Plant(plant) if !(1..=3).contains(&plant.block) => {
+                    return Err(Exit::usage(format!("plant: block {}, 1 to 3 expected", plant.block)));
+                }
+                Simulated::Drive { bus, .. } | Simulated::Io { bus, .. } if self.can(*bus).is_none() => {
+                    return Err(Exit::usage(format!(
+                        "a simulated device is on {bus:?}, which is not connected"
+                    )));
+                }
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+
+    pub(super) const fn can(&self, bus: BusName) -> Option<&Can> {
+        match bus {
+            BusName::Can1 => self.can1.as_ref(),
+            BusName::Can2 => self.can2.as_ref(),
+        }
+    }
+
+    /// Parameters to set, in display units.
+    pub(super) fn parameters(&self) -> Result<Vec<(u16, i32)>, Exit> {
+        let mut list = Vec::new();
+        if let Some(number) = self.controller.device_number {
+            list.push((5, i32::from(number)));
+        }
+        for (key, value) in &self.parameters {
+            let entry = find(key).map_err(|error| Exit::usage(error.to_string()))?;
+            let value = match value {
+                Setting::Number(number) => *number,
+                Setting::Text(text) => {
+                    entry.parse(text, &Values::factory()).map_err(|error| Exit::usage(error.to_string()))?
+                }
+            };
+            list.push((entry.index(), value));
+        }
+        Ok(list)
+    }
+}
+
+impl Step {
+    fn check(&self) -> Result<(), Exit> {
+        let what = self.action.name();
+        let missing = |field| Exit::usage(format!("{what} at {} s: {field} is missing", self.at));
+        if !(self.at >= 0.0 && self.at.is_finite()) {
+            return Err(Exit::usage(format!("{what}: at = {}, a time from 0 on expected", self.at)));
+        }
+        if !(1..=6).contains(&self.axis) {
+            return Err(Exit::usage(format!("{what} at {} s: axis {}, 1 to 6 expected", self.at, self.axis)));
+        }
+        match self.action {
+            Action::MoveAbsolute | Action::SetPosition if self.position.is_none() => Err(missing("position")),
+            Action::MoveRelative if self.distance.is_none() => Err(missing("distance")),
+            Action::MoveVelocity if self.velocity.is_none() => Err(missing("velocity")),
+            Action::Jog if self.duration.is_none() => Err(missing("for")),
+            _ => Ok(()),
+        }
+    }
+
+    pub(super) fn begin(&self) -> Duration {
+        Duration::from_secs_f64(self.at)
+    }
+
+    /// When what is held ends.
+    pub(super) fn end(&self) -> Option<Duration> {
+        self.duration.map(|duration| self.begin().saturating_add(Duration::from_secs_f64(duration.max(0.0))))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<Config, String> {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("run.toml");
+        std::fs::write(&path, text).unwrap();
+        Config::read(&path).map_err(|exit| exit.message)
+    }
+
+    #[test]
+    fn the_example_of_the_contract_is_read() {
+        let config = read(
+            "[controller]\nmodel = 8230\ndevice_number = 0\nstate = \"state-dir\"\n\
+             [[serial]]\nport = \"COM 2\"\nendpoint = \"pty:line\"\nprotocol = \"lb2\"\n\
+             [can1]\nendpoint = \"virtual:a\"\nbitrate = 500000\n\
+             [can2]\nendpoint = \"slcan:/dev/ttyACM0\"\n\
+             [parameters]\n642 = 3276800\n\"t max. acceleration@1\" = \"0.5\"\n\
+             [[simulate]]\nkind = \"drive\"\nbus = \"can2\"\nnode = 1\n\
+             [[program]]\nat = 1.0\ndo = \"move-absolute\"\naxis = 1\nposition = 1000000\nvelocity = 3276800\n",
+        )
+        .unwrap();
+        assert_eq!(config.model().unwrap(), Model::Gel8230);
+        assert_eq!(config.parameters().unwrap(), [(5, 0), (642, 3_276_800), (654, 500)]);
+        assert_eq!(config.serial[0].port, ComPort::Com2);
+        assert_eq!(config.program[0].position, Some(1_000_000));
+        assert!(matches!(config.simulate[0], Simulated::Drive { bus: BusName::Can2, node: 1 }));
+    }
+
+    #[test]
+    fn mistakes_are_named() {
+        let error = |text| read(text).unwrap_err();
+        assert!(error("[controller]\nmodel = 8232\n").contains("8230, 8231, 8235 or 8236"));
+        assert!(error("[controler]\n").contains("controler"));
+        assert!(
+            error("[[program]]\nat = 1\ndo = \"move-absolute\"\naxis = 1\n").contains("position is missing")
+        );
+        assert!(error("[[program]]\nat = 1\ndo = \"home\"\naxis = 7\n").contains("1 to 6"));
+        assert!(
+            error("[[simulate]]\nkind = \"drive\"\nbus = \"can1\"\nnode = 1\n").contains("not connected")
+        );
+        let unknown = read("[parameters]\n50 = 1\n").unwrap().parameters().unwrap_err();
+        assert!(unknown.message.contains("50"), "{}", unknown.message);
+    }
+}

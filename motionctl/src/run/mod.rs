@@ -1,0 +1,153 @@
+//! `motionctl run`: a soft MotionController in real time.
+
+pub(crate) mod cli;
+mod config;
+mod pace;
+mod plants;
+mod program;
+mod report;
+mod serial;
+
+use core::sync::atomic::{AtomicBool, Ordering};
+use core::time::Duration;
+
+use lb2::device::Device;
+use lb2::telegram::BANK_LEN;
+use motion_core::application::State;
+use motion_core::control::DriveInputs;
+use motion_core::io::Outputs;
+use motion_core::storage::Storage;
+use motion_core::{Controller, STORAGE_LEN};
+use motion_io::port::{Role, open};
+
+use crate::can::stop_flag;
+use crate::exit::Exit;
+use crate::output::Output;
+use crate::storage::FileStorage;
+use config::{ComPort, Config};
+use pace::Pace;
+use program::Program;
+use report::Report;
+use serial::Line;
+
+/// Longest time that axes have to come to standstill when the program ends.
+const STANDSTILL: Duration = Duration::from_secs(20);
+
+pub(crate) fn run(out: &Output, arguments: &cli::Run) -> Result<(), Exit> {
+    let config = Config::read(&arguments.file)?;
+    let limit = match arguments.duration {
+        Some(seconds) => Some(
+            Duration::try_from_secs_f64(seconds)
+                .map_err(|error| Exit::usage(format!("--for {seconds}: {error}")))?,
+        ),
+        None => None,
+    };
+    let stop = stop_flag()?;
+    match &config.controller.state {
+        Some(directory) => {
+            let name = directory.display().to_string();
+            std::fs::create_dir_all(directory).map_err(|error| Exit::file(&name, &error))?;
+            let storage =
+                FileStorage::open(&directory.join("flash.bin")).map_err(|error| Exit::file(&name, &error))?;
+            control(out, &config, storage, limit, &stop)
+        }
+        None => control(out, &config, vec![0xFF; STORAGE_LEN], limit, &stop),
+    }
+}
+
+/// Sets the configuration's parameters, which must pass the loader.
+fn set_up<S: Storage>(controller: &mut Controller<S, Vec<u8>>, config: &Config) -> Result<(), Exit> {
+    for (index, value) in config.parameters()? {
+        let answer = controller.write_parameter(index, value);
+        if answer.code.is_error() {
+            return Err(Exit::usage(format!("[{index:03}] = {value}: {}", answer.text)));
+        }
+    }
+    let mut fault = None;
+    let loaded = controller.load(|finding| {
+        fault.get_or_insert(finding);
+    });
+    match fault {
+        Some(finding) if !loaded => Err(Exit::usage(format!(
+            "[{:03}]: {} ({})",
+            finding.index, finding.rule.message, finding.rule.clause
+        ))),
+        _ => Ok(()),
+    }
+}
+
+fn control(
+    out: &Output,
+    config: &Config,
+    storage: impl Storage,
+    limit: Option<Duration>,
+    stop: &AtomicBool,
+) -> Result<(), Exit> {
+    let model = config.model()?;
+    let mut controller = Controller::power_on(model, storage, vec![0; BANK_LEN]);
+    set_up(&mut controller, config)?;
+    let mut machine = plants::machine(&config.simulate)?;
+    let mut program = Program::new(&config.program);
+    let mut lines = Vec::new();
+    for serial in &config.serial {
+        let endpoint = serial.endpoint()?;
+        let port = open(&endpoint, Role::Device).map_err(|error| Exit::trouble(error.to_string()))?;
+        // LB2 has the port that CoDeSys does not have (6.3.3, [006]).
+        let codesys = if controller.working().at(6, 0) == 0 { ComPort::Com1 } else { ComPort::Com2 };
+        if serial.port == codesys {
+            out.remark(format!("{endpoint}: [006] gives this port to CoDeSys; LB2 answers all the same"));
+        }
+        lines.push((endpoint.to_string(), Line::new(port)));
+    }
+    for missing in pace::real_time() {
+        out.remark(missing);
+    }
+    let mut report = Report::new(out);
+    let mut pace = Pace::new();
+    report.ready(pace.now(), model.number(), controller.cycle_time());
+    let mut outputs = Outputs::default();
+    let mut stored = controller.failures().total();
+    let mut ending = None;
+    let mut before = Duration::ZERO;
+    loop {
+        let cycle = controller.cycle_time();
+        let now = pace.wait(cycle);
+        program.advance(now);
+        let inputs = machine.run(cycle.as_millis() as u32, &outputs);
+        outputs = controller.cycle(&inputs, &DriveInputs::default(), &mut program).terminals;
+        for (name, line) in &mut lines {
+            line.serve(now, &mut controller).map_err(|error| Exit::file(name, &error))?;
+        }
+        controller.advance(now.saturating_sub(before)).map_err(|error| Exit::trouble(error.to_string()))?;
+        before = now;
+        for axis in 0..6 {
+            if let Some(status) = controller.axis_status(axis) {
+                report.axis(now, axis, status);
+            }
+        }
+        let total = controller.failures().total();
+        let new = total.wrapping_sub(core::mem::replace(&mut stored, total)) as usize;
+        let list = controller.failures().stored();
+        list.iter().skip(list.len().saturating_sub(new)).for_each(|&failure| report.failure(now, failure));
+        for (axis, action, outcome) in program.ended.drain(..) {
+            report.step(now, axis, action.name(), outcome);
+        }
+        report.cycle(now, &pace.jitter);
+        if ending.is_none() && (stop.load(Ordering::Relaxed) || limit.is_some_and(|limit| now >= limit)) {
+            program.stop();
+            ending = Some(now);
+        } else if let Some(since) = ending {
+            let resting = |axis| controller.axis_status(axis).is_none_or(|s| s.state == State::Disabled);
+            if (0..6).all(resting) {
+                break;
+            }
+            if now > since + STANDSTILL {
+                report.end(now, &pace.jitter);
+                return Err(Exit::check("an axis did not come to standstill"));
+            }
+        }
+    }
+    report.end(pace.now(), &pace.jitter);
+    // What the last moments brought is retained like a battery would.
+    controller.advance(Duration::from_secs(60)).map_err(|error| Exit::trouble(error.to_string()))
+}

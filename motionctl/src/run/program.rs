@@ -1,0 +1,171 @@
+//! The program of a configuration: function blocks that begin at their time.
+
+use core::time::Duration;
+
+use motion_core::application::blocks::{
+    Halt, Home, Jog, MoveAbsolute, MoveRelative, MoveVelocity, Outputs, Power, Reset, SetPosition, Stop,
+};
+use motion_core::application::{Application, MotionError, Plc, State};
+
+use super::config::{Action, Step};
+
+/// A step's function block: runs one cycle, with its inputs asked for or not.
+type Block = Box<dyn FnMut(&mut Plc<'_>, bool) -> Outputs>;
+
+/// How a step ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Outcome {
+    Done,
+    Aborted,
+    Failed(MotionError),
+}
+
+struct Running {
+    begin: Duration,
+    end: Option<Duration>,
+    axis: u8,
+    action: Action,
+    block: Block,
+    over: bool,
+}
+
+/// The program, and what stops it.
+#[derive(Default)]
+pub(super) struct Program {
+    steps: Vec<Running>,
+    now: Duration,
+    /// Every axis is brought to standstill and switched off.
+    stopping: bool,
+    stops: Vec<(Stop, Power)>,
+    /// Steps that have ended: axis, action, outcome.
+    pub(super) ended: Vec<(u8, Action, Outcome)>,
+}
+
+impl Program {
+    pub(super) fn new(steps: &[Step]) -> Self {
+        let steps = steps.iter().map(|step| Running {
+            begin: step.begin(),
+            end: step.end(),
+            axis: step.axis,
+            action: step.action,
+            block: block(step),
+            over: false,
+        });
+        Self { steps: steps.collect(), ..Self::default() }
+    }
+
+    /// Lets the next cycle begin at `now`.
+    pub(super) const fn advance(&mut self, now: Duration) {
+        self.now = now;
+    }
+
+    /// Brings every axis to standstill with the greatest deceleration, then disables the drives
+    /// (decision 28).
+    pub(super) fn stop(&mut self) {
+        if !core::mem::replace(&mut self.stopping, true) {
+            self.stops = (1..=6).map(|axis| (Stop::new(axis), Power::new(axis))).collect();
+        }
+    }
+
+    fn bring_to_standstill(&mut self, plc: &mut Plc<'_>) {
+        for (stop, power) in &mut self.stops {
+            let Ok(state) = plc.axis(stop.axis).map(|axis| axis.status().state) else { continue };
+            let moving = !matches!(state, State::Disabled | State::Standstill | State::ErrorStop);
+            stop.execute = true;
+            let outputs = stop.call(plc);
+            // A failed axis has stopped by itself.
+            if outputs.done || outputs.error || !moving {
+                power.enable = false;
+                // An axis that is not activated has no drive to disable.
+                let _ = power.call(plc);
+            }
+        }
+    }
+}
+
+impl Application for Program {
+    fn cycle(&mut self, plc: &mut Plc<'_>) {
+        if self.stopping {
+            return self.bring_to_standstill(plc);
+        }
+        for step in &mut self.steps {
+            if step.over || self.now < step.begin {
+                continue;
+            }
+            let asked = step.end.is_none_or(|end| self.now < end);
+            let outputs = (step.block)(plc, asked);
+            let outcome = if outputs.error {
+                Outcome::Failed(outputs.error_id)
+            } else if outputs.command_aborted {
+                Outcome::Aborted
+            } else if outputs.done && (step.end.is_none() || !asked) || !asked && !outputs.busy {
+                Outcome::Done
+            } else {
+                continue;
+            };
+            step.over = true;
+            self.ended.push((step.axis, step.action, outcome));
+        }
+    }
+}
+
+macro_rules! executed {
+    ($block:expr) => {{
+        let mut block = $block;
+        Box::new(move |plc: &mut Plc<'_>, asked: bool| {
+            block.execute = asked;
+            block.call(plc)
+        })
+    }};
+}
+
+fn block(step: &Step) -> Block {
+    let axis = step.axis;
+    let speed = step.velocity.map(i32::unsigned_abs);
+    let (position, distance) = (step.position.unwrap_or(0), step.distance.unwrap_or(0));
+    match step.action {
+        Action::Power => {
+            let mut power = Power::new(axis);
+            power.enable = step.on;
+            Box::new(move |plc, _| match power.call(plc) {
+                Ok(on) => {
+                    Outputs { done: on == power.enable, busy: on != power.enable, ..Outputs::default() }
+                }
+                Err(error_id) => Outputs { error: true, error_id, ..Outputs::default() },
+            })
+        }
+        Action::Home => executed!(Home::new(axis)),
+        Action::MoveAbsolute => {
+            let mut block = MoveAbsolute::new(axis);
+            (block.position, block.velocity) = (position, speed);
+            executed!(block)
+        }
+        Action::MoveRelative => {
+            let mut block = MoveRelative::new(axis);
+            (block.distance, block.velocity) = (distance, speed);
+            executed!(block)
+        }
+        Action::MoveVelocity => {
+            let mut block = MoveVelocity::new(axis);
+            block.velocity = step.velocity.unwrap_or(0);
+            executed!(block)
+        }
+        Action::Jog => {
+            let mut jog = Jog::new(axis);
+            let forward = step.forward;
+            jog.fast = step.fast;
+            Box::new(move |plc, asked| {
+                (jog.forward, jog.backward) = (asked && forward, asked && !forward);
+                jog.call(plc)
+            })
+        }
+        Action::Stop => executed!(Stop::new(axis)),
+        Action::Halt => executed!(Halt::new(axis)),
+        Action::Reset => executed!(Reset::new(axis)),
+        Action::SetPosition => {
+            let mut block = SetPosition::new(axis);
+            block.position = position;
+            executed!(block)
+        }
+    }
+}

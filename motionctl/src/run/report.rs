@@ -1,0 +1,120 @@
+//! What `motionctl run` tells while it runs.
+
+use core::time::Duration;
+
+use lb2::code::StoredFailure;
+use motion_core::application::{AxisStatus, State};
+use motion_core::failure;
+use serde_json::{Value, json};
+
+use super::pace::Jitter;
+use super::program::Outcome;
+use crate::output::Output;
+
+const fn state_name(state: State) -> &'static str {
+    match state {
+        State::Disabled => "disabled",
+        State::Standstill => "standstill",
+        State::DiscreteMotion => "discrete-motion",
+        State::ContinuousMotion => "continuous-motion",
+        State::Homing => "homing",
+        State::Stopping => "stopping",
+        State::ErrorStop => "error-stop",
+    }
+}
+
+/// Tells what changed since the last cycle.
+pub(super) struct Report<'a> {
+    out: &'a Output,
+    states: [State; 6],
+    summary: Duration,
+    cycles: u64,
+}
+
+impl<'a> Report<'a> {
+    pub(super) const fn new(out: &'a Output) -> Self {
+        Self { out, states: [State::Disabled; 6], summary: Duration::from_secs(1), cycles: 0 }
+    }
+
+    fn event(&self, at: Duration, event: &str, mut fields: Value, text: &str) {
+        let mut document = json!({ "t": at.as_secs_f64(), "event": event });
+        if let (Some(whole), Some(fields)) = (document.as_object_mut(), fields.as_object_mut()) {
+            whole.append(fields);
+        }
+        self.out.document(document, || self.out.say(&format!("{:10.3} s  {text}", at.as_secs_f64())));
+    }
+
+    pub(super) fn ready(&self, at: Duration, model: u16, cycle: Duration) {
+        let text = format!("GEL {model} runs, cycle {} ms", cycle.as_millis());
+        self.event(at, "ready", json!({ "model": model, "cycle_ms": cycle.as_millis() as u64 }), &text);
+    }
+
+    pub(super) fn axis(&mut self, at: Duration, axis: usize, status: &AxisStatus) {
+        if core::mem::replace(&mut self.states[axis], status.state) == status.state {
+            return;
+        }
+        let (number, name) = (axis + 1, state_name(status.state));
+        let text = format!("axis {number}: {name} at {}", status.position);
+        let fields = json!({ "axis": number, "state": name, "position": status.position });
+        self.event(at, "axis", fields, &text);
+    }
+
+    pub(super) fn failure(&self, at: Duration, stored: StoredFailure) {
+        let StoredFailure { axis, failure: number } = stored;
+        let words = failure::text(number).unwrap_or("unknown failure");
+        let fields = json!({ "axis": axis, "failure": number.0, "text": words });
+        self.event(at, "failure", fields, &format!("axis {axis}: failure {}: {words}", number.0));
+    }
+
+    pub(super) fn step(&self, at: Duration, axis: u8, action: &str, outcome: Outcome) {
+        let (word, error) = match outcome {
+            Outcome::Done => ("done", None),
+            Outcome::Aborted => ("aborted", None),
+            Outcome::Failed(error) => ("error", Some(error)),
+        };
+        let mut fields = json!({ "axis": axis, "do": action, "outcome": word });
+        let mut text = format!("axis {axis}: {action}: {word}");
+        if let (Some(error), Some(fields)) = (error, fields.as_object_mut()) {
+            fields.insert("error".into(), json!(error.0));
+            fields.insert("text".into(), json!(error.to_string()));
+            text += &format!(" {:X}h, {error}", error.0);
+        }
+        self.event(at, "step", fields, &text);
+    }
+
+    /// Once a second, in the stream only.
+    pub(super) fn cycle(&mut self, at: Duration, jitter: &Jitter) {
+        if at < self.summary {
+            return;
+        }
+        self.summary = at + Duration::from_secs(1);
+        let cycles = jitter.cycles - core::mem::replace(&mut self.cycles, jitter.cycles);
+        if self.out.json {
+            let fields = json!({
+                "cycles": cycles,
+                "overruns": jitter.overruns,
+                "worst_us": jitter.worst().as_micros() as u64,
+            });
+            self.event(at, "cycle", fields, "");
+        }
+    }
+
+    pub(super) fn end(&self, at: Duration, jitter: &Jitter) {
+        let fields = json!({
+            "cycles": jitter.cycles,
+            "overruns": jitter.overruns,
+            "worst_us": jitter.worst().as_micros() as u64,
+            "jitter": jitter.document(),
+        });
+        let mut text = format!(
+            "{} cycles, {} overruns, begun at worst {} µs late",
+            jitter.cycles,
+            jitter.overruns,
+            jitter.worst().as_micros()
+        );
+        for line in jitter.lines() {
+            text += &format!("\n    {line}");
+        }
+        self.event(at, "end", fields, &text);
+    }
+}
