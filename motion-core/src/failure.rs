@@ -23,6 +23,8 @@ pub const ACTUAL_VALUE_JUMP: Failure = Failure(101);
 pub const DRIVE_LOST: Failure = Failure(102);
 /// A drive on a CAN bus reports a fault.
 pub const DRIVE_FAULT: Failure = Failure(103);
+/// A drive is not in the operating mode "digital speed" (6.6.1.3).
+pub const DRIVE_MODE: Failure = Failure(104);
 
 /// What a failure means: the manual's text, or this project's; `None` for a number of neither.
 #[must_use]
@@ -36,6 +38,7 @@ pub const fn text(failure: Failure) -> Option<&'static str> {
         ACTUAL_VALUE_JUMP => Some("actual value jumped by more than Failure diff. MAX"),
         DRIVE_LOST => Some("drive lost on the CAN bus"),
         DRIVE_FAULT => Some("drive reports a fault"),
+        DRIVE_MODE => Some("drive is not in the operating mode digital speed"),
         other => other.text(),
     }
 }
@@ -101,6 +104,7 @@ mod tests {
             ACTUAL_VALUE_JUMP,
             DRIVE_LOST,
             DRIVE_FAULT,
+            DRIVE_MODE,
         ];
         for (at, failure) in own.iter().enumerate() {
             assert!(failure.text().is_none() && text(*failure).is_some(), "{failure:?}");

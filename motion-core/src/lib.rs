@@ -8,6 +8,7 @@ extern crate alloc;
 extern crate std;
 
 pub mod application;
+pub mod bus;
 pub mod control;
 mod controller;
 pub mod failure;

@@ -5,7 +5,6 @@ use core::time::Duration;
 use lb2::code::{ErrorCode, Failure, LoaderCode, StoredFailure};
 use lb2::device::Device;
 use motion_core::application::Plc;
-use motion_core::control::DriveInputs;
 use motion_core::io::{Inputs, Terminal};
 use motion_core::parameters::{Values, iter};
 use motion_core::storage::{Storage, StorageError};
@@ -242,19 +241,19 @@ fn a_set_position_survives_the_loss_of_power() {
     inputs.encoders[0].count = 500;
     let mut application =
         |plc: &mut Plc<'_>| plc.axis(1).and_then(|axis| axis.set_position(70)).unwrap_or_default();
-    controller.cycle(&inputs, &DriveInputs::default(), &mut application);
-    controller.cycle(&inputs, &DriveInputs::default(), &mut ());
+    controller.cycle(Duration::ZERO, &inputs, &mut application);
+    controller.cycle(Duration::ZERO, &inputs, &mut ());
     assert_eq!(controller.actual_values()[0].position, 70);
     controller.advance(Duration::from_millis(3)).unwrap();
     let mut controller = on(controller.power_off());
-    controller.cycle(&inputs, &DriveInputs::default(), &mut ());
+    controller.cycle(Duration::ZERO, &inputs, &mut ());
     assert_eq!(controller.actual_values()[0].position, 70);
     // Another type of input sets it back.
     for kind in [1, 0] {
         controller.write_parameter(100, kind);
         controller.call_loader();
     }
-    controller.cycle(&inputs, &DriveInputs::default(), &mut ());
+    controller.cycle(Duration::ZERO, &inputs, &mut ());
     assert_eq!(controller.actual_values()[0].position, 500);
 }
 
@@ -263,10 +262,10 @@ fn a_set_position_survives_the_loss_of_power() {
 fn an_encoder_failure_is_stored_in_the_same_cycle() {
     let mut controller = new();
     let mut inputs = Inputs::default();
-    controller.cycle(&inputs, &DriveInputs::default(), &mut ());
+    controller.cycle(Duration::ZERO, &inputs, &mut ());
     assert_eq!(controller.failure_count(), 0);
     inputs.encoders[1].fault = true;
-    controller.cycle(&inputs, &DriveInputs::default(), &mut ());
+    controller.cycle(Duration::ZERO, &inputs, &mut ());
     let stored = StoredFailure { axis: 2, failure: motion_core::failure::READING_LOST };
     assert_eq!((controller.failure_count(), controller.failure(0)), (1, Some(stored)));
 }

@@ -37,23 +37,40 @@ impl<'d> ConciseDcf<'d> {
     ///
     /// # Errors
     /// [`DcfError`].
-    pub fn new(bytes: &'d [u8]) -> Result<Self, DcfError> {
+    pub const fn new(bytes: &'d [u8]) -> Result<Self, DcfError> {
         if bytes.is_empty() {
             return Ok(Self::EMPTY);
         }
-        let (entries, rest) =
-            bytes.split_first_chunk().ok_or(DcfError::Truncated { entry: 0, entries: 0 })?;
-        let checked = Self { entries: u32::from_le_bytes(*entries), rest };
-        let mut walk = checked;
+        let Some((entries, rest)) = bytes.split_first_chunk() else {
+            return Err(DcfError::Truncated { entry: 0, entries: 0 });
+        };
+        let entries = u32::from_le_bytes(*entries);
+        let mut walk = Self { entries, rest };
         let mut entry = 0;
         while walk.entries > 0 {
             entry += 1;
-            walk.next().ok_or(DcfError::Truncated { entry, entries: checked.entries })?;
+            if walk.take_entry().is_none() {
+                return Err(DcfError::Truncated { entry, entries });
+            }
         }
         match walk.rest.len() {
-            0 => Ok(checked),
+            0 => Ok(Self { entries, rest }),
             trailing => Err(DcfError::Trailing(trailing)),
         }
+    }
+
+    /// Takes the next entry.
+    const fn take_entry(&mut self) -> Option<(Address, &'d [u8])> {
+        let Some(entries) = self.entries.checked_sub(1) else { return None };
+        let Some((&[low, high, sub, a, b, c, d], rest)) = self.rest.split_first_chunk::<7>() else {
+            return None;
+        };
+        // A size that does not fit is beyond every slice.
+        let size = u32::from_le_bytes([a, b, c, d]) as usize;
+        let Some((data, rest)) = rest.split_at_checked(size) else { return None };
+        self.entries = entries;
+        self.rest = rest;
+        Some((Address::new(u16::from_le_bytes([low, high]), sub), data))
     }
 
     /// Entries left.
@@ -73,12 +90,7 @@ impl<'d> Iterator for ConciseDcf<'d> {
     type Item = (Address, &'d [u8]);
 
     fn next(&mut self) -> Option<Self::Item> {
-        self.entries = self.entries.checked_sub(1)?;
-        let (&[low, high, sub, a, b, c, d], rest) = self.rest.split_first_chunk::<7>()?;
-        let size = usize::try_from(u32::from_le_bytes([a, b, c, d])).ok()?;
-        let (data, rest) = rest.split_at_checked(size)?;
-        self.rest = rest;
-        Some((Address::new(u16::from_le_bytes([low, high]), sub), data))
+        self.take_entry()
     }
 }
 

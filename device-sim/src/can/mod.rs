@@ -6,6 +6,7 @@
 
 mod bits;
 mod bus;
+mod controller;
 mod counters;
 mod faults;
 mod network;

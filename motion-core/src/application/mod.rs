@@ -12,6 +12,7 @@ mod error;
 pub use axis::{AxisAccess, AxisStatus, Order, Progress, State, Ticket};
 pub use error::MotionError;
 
+use crate::bus::CanBus;
 use crate::input::ActualValue;
 use crate::io::{AnalogInputs, DigitalInputs, DigitalOutputs, ProcessImage, Pwm};
 
@@ -35,6 +36,8 @@ pub struct Plc<'a> {
     pub pwm: &'a mut [Pwm; 3],
     /// Process image of the extension module.
     pub bus: &'a mut ProcessImage,
+    /// CAN 1 and CAN 2: process data of their objects, channels of CAN Link.
+    pub can: &'a mut [CanBus; 2],
     pub(crate) axes: &'a mut [AxisAccess; 6],
 }
 

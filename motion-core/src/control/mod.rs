@@ -10,6 +10,7 @@ use lb2::code::{Failure, StoredFailure};
 
 use crate::Model;
 use crate::application::{Application, AxisAccess, AxisStatus, Plc, Progress};
+use crate::bus::CanBus;
 use crate::input::{self, ActualValue, ActualValueInput, AxisQuantities, Kind, Sources};
 use crate::io::{
     AnalogInputs, DigitalInputs, DigitalOutputs, FieldBus, Inputs, Outputs, ProcessImage, Pwm, Terminal,
@@ -28,8 +29,10 @@ pub const DRIVES: usize = 6;
 pub struct DriveInputs {
     /// Positions, 24 bits, 2^20 a turn; `None` while there is no data.
     pub positions: [Option<u32>; DRIVES],
-    /// What failed: a drive lost, or its own fault.
-    pub failures: [Option<Failure>; DRIVES],
+    /// What failed in this cycle, by object IN: a drive lost, or its own fault.
+    pub input_failures: [Option<Failure>; DRIVES],
+    /// The same, by object OUT.
+    pub output_failures: [Option<Failure>; DRIVES],
 }
 
 /// What is put out in one cycle.
@@ -166,6 +169,7 @@ impl<A: AxisControl> Control<A> {
         &mut self,
         inputs: &Inputs,
         drives: &DriveInputs,
+        buses: &mut [CanBus; 2],
         application: &mut impl Application,
         mut log: impl FnMut(StoredFailure),
     ) -> CycleOutputs {
@@ -174,7 +178,7 @@ impl<A: AxisControl> Control<A> {
         self.analog.cycle(cycle, &inputs.analog);
         let stop = self.plc_run(digital);
         self.read_inputs(inputs, digital, drives);
-        let mut commands: [Option<Command>; COUNT] = Default::default();
+        let mut commands: [Option<(Command, bool)>; COUNT] = Default::default();
         for at in 0..COUNT {
             let (Some(axis), Some(access), Some(&Some(route))) =
                 (self.axes.get_mut(at), self.access.get_mut(at), self.settings.axes.get(at))
@@ -202,7 +206,7 @@ impl<A: AxisControl> Control<A> {
                 reset: core::mem::take(&mut access.reset),
                 order: access.take(),
                 stop,
-                failure: route.drive.and_then(|drive| drives.failures.get(drive).copied().flatten()),
+                failure: route.failure(drives),
             };
             let output = axis.cycle(&input);
             let number = at as u8 + 1;
@@ -218,7 +222,7 @@ impl<A: AxisControl> Control<A> {
             }
             if let Some(slot) = route.output.and_then(|to| commands.get_mut(to)) {
                 // Of several axes on one output, the first has it (project-defined).
-                slot.get_or_insert(output.command);
+                slot.get_or_insert((output.command, input.reset));
             }
             if let Some(own) = self.quantities.get_mut(at) {
                 own.position = output.status.nominal_position;
@@ -228,7 +232,7 @@ impl<A: AxisControl> Control<A> {
         self.log_inputs_without_axis(&mut log);
         let (mut put, drives) = self.put_out(&commands);
         if self.running {
-            self.run(application, digital);
+            self.run(application, digital, buses);
         } else {
             self.digital.write([0; 3]);
             self.pwm = Default::default();
@@ -295,12 +299,16 @@ impl<A: AxisControl> Control<A> {
         }
     }
 
-    fn put_out(&mut self, commands: &[Option<Command>; COUNT]) -> (Outputs, [Option<DriveSetpoint>; DRIVES]) {
+    fn put_out(
+        &mut self,
+        commands: &[Option<(Command, bool)>; COUNT],
+    ) -> (Outputs, [Option<DriveSetpoint>; DRIVES]) {
         let mut put = Outputs::default();
         let mut drives = [None; DRIVES];
         self.digital.begin();
         for (at, (output, command)) in self.outputs.iter_mut().zip(commands).enumerate() {
-            let nominal: Nominal = output.cycle(&command.unwrap_or_default(), self.settings.cycle);
+            let (command, reset) = command.unwrap_or_default();
+            let nominal: Nominal = output.cycle(&command, self.settings.cycle);
             self.digital.link(at, nominal.bits);
             if let (Some(voltage), Some(slot)) = (nominal.voltage, put.analog.get_mut(at)) {
                 *slot = voltage;
@@ -311,7 +319,7 @@ impl<A: AxisControl> Control<A> {
             if let Some(drive) = nominal.drive
                 && let Some(slot) = drives.get_mut(drive.object)
             {
-                *slot = Some(drive);
+                *slot = Some(DriveSetpoint { reset, ..drive });
             }
         }
         for (own, route) in self.quantities.iter_mut().zip(&self.settings.axes) {
@@ -321,7 +329,7 @@ impl<A: AxisControl> Control<A> {
         (put, drives)
     }
 
-    fn run(&mut self, application: &mut impl Application, digital: DigitalInputs) {
+    fn run(&mut self, application: &mut impl Application, digital: DigitalInputs, can: &mut [CanBus; 2]) {
         application.cycle(&mut Plc {
             cycle: self.settings.cycle,
             inputs: digital,
@@ -330,6 +338,7 @@ impl<A: AxisControl> Control<A> {
             outputs: &mut self.digital,
             pwm: &mut self.pwm,
             bus: &mut self.bus,
+            can,
             axes: &mut self.access,
         });
         for at in 0..COUNT {

@@ -1,10 +1,12 @@
 //! Settings of the cycle: what is activated and how axes, inputs and outputs are assigned, read from the
 //! parameters in one place.
 
-use super::COUNT;
+use lb2::code::Failure;
+
 use super::axis::PlcStop;
-use crate::output::{self, Kind};
+use super::{COUNT, DRIVES, DriveInputs};
 use crate::parameters::Values;
+use crate::{input, output};
 
 /// Where an axis has its actual value from, `[606]`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -24,14 +26,23 @@ pub(super) struct AxisRoute {
     pub(super) source: ActualSource,
     /// `[612]`, by place.
     pub(super) output: Option<usize>,
-    /// Object of the drive that its output or input uses, by place.
-    pub(super) drive: Option<usize>,
+    /// Objects of the drives that its input and output use, by place.
+    drives: (Option<usize>, Option<usize>),
 }
 
 impl AxisRoute {
     /// Whether its actual value is that of an input, by place.
     pub(super) fn is_on(self, input: usize) -> bool {
         self.source == ActualSource::Input(input)
+    }
+
+    /// What failed of its drives.
+    pub(super) fn failure(self, inputs: &DriveInputs) -> Option<Failure> {
+        let (reads, writes) = self.drives;
+        let failed = |failures: &[Option<Failure>; DRIVES], at: Option<usize>| {
+            at.and_then(|at| failures.get(at).copied().flatten())
+        };
+        failed(&inputs.output_failures, writes).or_else(|| failed(&inputs.input_failures, reads))
     }
 }
 
@@ -57,8 +68,8 @@ impl Settings {
             let controlled = at < activated && values.at(600, at) != 0;
             controlled.then(|| {
                 let output = place(values.at(612, at));
-                let drive = output.and_then(|output| match output::Settings::read(values, output).kind {
-                    Kind::CanBus { object, .. } => object,
+                let writes = output.and_then(|output| match output::Settings::read(values, output).kind {
+                    output::Kind::CanBus { object, .. } => object,
                     _ => None,
                 });
                 let source = match values.at(606, at) {
@@ -67,7 +78,14 @@ impl Settings {
                     8 => ActualSource::Virtual,
                     input => place(input).map_or(ActualSource::None, ActualSource::Input),
                 };
-                AxisRoute { source, output, drive }
+                let reads = match source {
+                    ActualSource::Input(input) => match input::Settings::read(values, input).kind {
+                        input::Kind::Can { object } => object,
+                        _ => None,
+                    },
+                    _ => None,
+                };
+                AxisRoute { source, output, drives: (reads, writes) }
             })
         };
         Self {

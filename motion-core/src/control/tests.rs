@@ -50,6 +50,7 @@ struct Rig {
     control: Control<Puppet>,
     inputs: Inputs,
     drives: DriveInputs,
+    buses: [CanBus; 2],
     log: Vec<StoredFailure>,
 }
 
@@ -62,6 +63,7 @@ fn rig(model: Model, changes: &[(u16, i32)]) -> Rig {
     inputs.digital.set(Terminal::PLC_RUN, true);
     Rig {
         control: Control::new(model, &values, [0; COUNT]),
+        buses: [0, 1].map(|at| CanBus::new(model.number(), &values, at)),
         values,
         inputs,
         drives: DriveInputs::default(),
@@ -72,7 +74,9 @@ fn rig(model: Model, changes: &[(u16, i32)]) -> Rig {
 impl Rig {
     fn cycle(&mut self, application: impl FnMut(&mut Plc<'_>)) -> CycleOutputs {
         let mut application = application;
-        self.control.cycle(&self.inputs, &self.drives, &mut application, |failure| self.log.push(failure))
+        self.control.cycle(&self.inputs, &self.drives, &mut self.buses, &mut application, |failure| {
+            self.log.push(failure);
+        })
     }
 
     fn idle(&mut self) -> CycleOutputs {
@@ -249,9 +253,9 @@ fn drives_are_joined_to_axes() {
     let mut rig = rig(Model::Gel8230, &changes);
     rig.drives.positions[2] = Some(1234 << 4);
     let put = rig.drive(1, 3_276_800);
-    assert_eq!(put.drives[2], Some(DriveSetpoint { object: 2, speed: 419_430, enable: true }));
+    assert_eq!(put.drives[2], Some(DriveSetpoint { object: 2, speed: 419_430, enable: true, reset: false }));
     assert_eq!(rig.last(0).actual.position, 1234);
-    rig.drives.failures[2] = Some(failure::DRIVE_LOST);
+    rig.drives.output_failures[2] = Some(failure::DRIVE_LOST);
     rig.idle();
     assert_eq!(rig.last(0).failure, Some(failure::DRIVE_LOST));
     assert_eq!(rig.last(1).failure, None);

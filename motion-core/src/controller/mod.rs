@@ -12,10 +12,11 @@ use lb2::code::{Failure, StoredFailure, Version};
 use lb2::telegram::{BANK_LEN, MAX_FAILURES};
 
 use crate::application::{Application, AxisAccess, AxisStatus};
-use crate::control::{Control, CycleOutputs, DriveInputs, Unmoved as Axis};
+use crate::bus::CanBus;
+use crate::control::{Control, DriveInputs, Unmoved as Axis};
 use crate::failure::FailureLog;
 use crate::input::ActualValue;
-use crate::io::{FieldBus, Inputs};
+use crate::io::{FieldBus, Inputs, Outputs};
 use crate::loader::{self, Finding};
 use crate::parameters::{COUNT, Values};
 use crate::storage::{Record, Storage, StorageError};
@@ -37,6 +38,9 @@ const FLASH: usize = STATUS.end();
 /// Bytes of [`Storage`] that a controller needs.
 pub const STORAGE_LEN: usize = FLASH + 2 * BANK_LEN;
 
+/// Places of the drives of CAN 1 (objects 1 and 2) and CAN 2 (objects 1…4) among all.
+const PLACES: [core::ops::Range<usize>; 2] = [0..2, 2..6];
+
 /// How often the run time is retained.
 const RETAIN: Duration = Duration::from_secs(60);
 
@@ -52,10 +56,13 @@ pub struct Controller<S, R> {
     /// As taken over by the loader: what is effective, and what 35h saves.
     working: Values,
     control: Control<Axis>,
+    buses: [CanBus; 2],
     failures: FailureLog,
     run_time: Duration,
     since_retained: Duration,
     retain: bool,
+    /// Whether a scan that was begun by hand is under way.
+    manual_scan: bool,
     /// Write pointers of 23h for banks 15 and 16.
     pointers: [usize; 2],
 }
@@ -93,11 +100,13 @@ impl<S: Storage, R: AsRef<[u8]> + AsMut<[u8]>> Controller<S, R> {
             ram,
             edited: working.clone(),
             control: Control::new(model, &working, status.offsets),
+            buses: [0, 1].map(|at| CanBus::new(model.number(), &working, at)),
             working,
             failures: status.failures,
             run_time: status.run_time,
             since_retained: Duration::ZERO,
             retain: false,
+            manual_scan: false,
             pointers: [0; 2],
         }
     }
@@ -193,6 +202,9 @@ impl<S: Storage, R: AsRef<[u8]> + AsMut<[u8]>> Controller<S, R> {
     fn take_over(&mut self) {
         self.working = self.edited.clone();
         self.control.configure(&self.working);
+        for bus in &mut self.buses {
+            bus.configure(&self.working);
+        }
         // Another type of input sets its offset back.
         self.retain = true;
     }
@@ -203,22 +215,50 @@ impl<S: Storage, R: AsRef<[u8]> + AsMut<[u8]>> Controller<S, R> {
         Duration::from_millis(self.control.cycle_time() as u64)
     }
 
-    /// One control cycle: inputs and drives in, outputs and set values out. Failures are stored, and
-    /// [`advance`](Self::advance) retains them.
-    pub fn cycle(
-        &mut self,
-        inputs: &Inputs,
-        drives: &DriveInputs,
-        application: &mut impl Application,
-    ) -> CycleOutputs {
-        let Self { control, failures, retain, .. } = self;
+    /// One control cycle at `now`: terminals in, terminals out; the buses' set values are ready to be
+    /// sent then. Failures are stored, and [`advance`](Self::advance) retains them.
+    ///
+    /// While a scan runs that was begun by [`scan`](Self::scan), application and feedback control
+    /// stand still, as 4.3.4.4 says, and nothing is put out.
+    pub fn cycle(&mut self, now: Duration, inputs: &Inputs, application: &mut impl Application) -> Outputs {
+        let Self { control, buses, failures, retain, manual_scan, .. } = self;
+        *manual_scan &= buses.iter().any(CanBus::is_scanning);
+        if *manual_scan {
+            return Outputs::default();
+        }
+        let mut drives = DriveInputs::default();
+        for (bus, places) in buses.iter_mut().zip(PLACES) {
+            bus.read_drives(now, places.start, places.len(), &mut drives);
+        }
         let offsets = control.offsets();
-        let outputs = control.cycle(inputs, drives, application, |failure| {
+        let outputs = control.cycle(inputs, &drives, buses, application, |failure| {
             failures.store(failure);
             *retain = true;
         });
+        for (bus, places) in buses.iter_mut().zip(PLACES) {
+            let wanted = outputs.drives.get(places).unwrap_or(&[]);
+            for (place, wanted) in wanted.iter().enumerate() {
+                if let Some(wanted) = wanted {
+                    bus.command(now, place, wanted);
+                }
+            }
+        }
         *retain |= control.offsets() != offsets;
-        outputs
+        outputs.terminals
+    }
+
+    /// CAN 1 (0) or CAN 2 (1): frames and time go in, frames come out.
+    pub fn bus(&mut self, at: usize) -> Option<&mut CanBus> {
+        self.buses.get_mut(at)
+    }
+
+    /// Scans a bus, 0 or 1, by hand (4.3.4.4); to be called with all axes at standstill. Whether there is
+    /// such a bus.
+    pub fn scan(&mut self, now: Duration, at: usize) -> bool {
+        let Some(bus) = self.buses.get_mut(at) else { return false };
+        bus.scan(now);
+        self.manual_scan = true;
+        true
     }
 
     /// Exchanges the process image with the field bus in the extension slot (6.9).

@@ -193,7 +193,9 @@ impl ActualValueInput {
             if !self.compensate(sources.cycle) {
                 self.value.velocity = 0;
                 self.value.frequency = 0;
-                self.value.failure = (!self.lost).then_some(failure::READING_LOST);
+                // A drive that has never been there is the bus' affair.
+                let told = self.lost || !self.settled && matches!(self.settings.kind, Kind::Can { .. });
+                self.value.failure = (!told).then_some(failure::READING_LOST);
                 self.lost = true;
             }
             return self.value;

@@ -391,6 +391,17 @@ fn parameter_254_is_the_object_of_the_drive() {
         assert_eq!(turns(&mut rig, turn * COUNTS_PER_TURN), turn * COUNTS_PER_TURN);
     }
     rig.set(254, 0);
+    assert!(!rig.cycle().real);
+}
+
+/// A drive whose data stop is a failure; one that has never been there is not the input's.
+#[test]
+fn a_drive_without_data_is_told_once_it_had_some() {
+    let mut rig = rig(0, &[(100, 2)]);
+    assert_eq!((rig.cycle().failure, rig.cycle().real), (None, false));
+    rig.can[2] = Some(0);
+    assert!(rig.cycle().real);
+    rig.can[2] = None;
     assert_eq!(rig.cycle().failure, Some(failure::READING_LOST));
 }
 

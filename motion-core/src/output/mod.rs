@@ -51,6 +51,8 @@ pub struct DriveSetpoint {
     pub speed: i32,
     /// Whether the drive is to be enabled.
     pub enable: bool,
+    /// Whether its fault is acknowledged.
+    pub reset: bool,
 }
 
 /// What an output gives in one cycle.
@@ -116,6 +118,7 @@ impl NominalValueOutput {
                     object,
                     speed: speed(command.velocity, increments, settings.inverted),
                     enable: command.enable,
+                    reset: false,
                 }),
                 ..Nominal::default()
             },

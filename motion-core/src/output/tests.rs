@@ -31,7 +31,7 @@ fn parameter_450_selects_what_is_put_out() {
     };
     assert_eq!(given(0), Nominal::default());
     assert_eq!(given(1), Nominal { voltage: Some(10_000), ..Nominal::default() });
-    let drive = Some(DriveSetpoint { object: 2, speed: 128, enable: true });
+    let drive = Some(DriveSetpoint { object: 2, speed: 128, enable: true, reset: false });
     assert_eq!(given(2), Nominal { drive, ..Nominal::default() });
     assert_eq!(given(3), Nominal { bits: 0b11000, ..Nominal::default() });
     assert_eq!(given(4), Nominal { clock: Some(Pwm::clock(0, 1_000_000)), ..Nominal::default() });

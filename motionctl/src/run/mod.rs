@@ -14,7 +14,6 @@ use core::time::Duration;
 use lb2::device::Device;
 use lb2::telegram::BANK_LEN;
 use motion_core::application::State;
-use motion_core::control::DriveInputs;
 use motion_core::io::Outputs;
 use motion_core::storage::Storage;
 use motion_core::{Controller, STORAGE_LEN};
@@ -114,7 +113,7 @@ fn control(
         let now = pace.wait(cycle);
         program.advance(now);
         let inputs = machine.run(cycle.as_millis() as u32, &outputs);
-        outputs = controller.cycle(&inputs, &DriveInputs::default(), &mut program).terminals;
+        outputs = controller.cycle(now, &inputs, &mut program);
         for (name, line) in &mut lines {
             line.serve(now, &mut controller).map_err(|error| Exit::file(name, &error))?;
         }

@@ -1,7 +1,9 @@
 //! The blocks against an axis that a script plays.
 
 use super::*;
+use crate::bus::CanBus;
 use crate::io::{AnalogInputs, DigitalInputs, DigitalOutputs, ProcessImage};
+use crate::parameters::Values;
 
 struct Rig {
     axes: [AxisAccess; 6],
@@ -24,6 +26,7 @@ impl Rig {
             outputs: &mut DigitalOutputs::default(),
             pwm: &mut Default::default(),
             bus: &mut ProcessImage::default(),
+            can: &mut [0, 1].map(|at| CanBus::new(8230, &Values::factory(), at)),
             axes: &mut self.axes,
         })
     }

@@ -1,0 +1,108 @@
+//! One drive LD 2000 behind an object IN and an object OUT (decision 14, 6.11).
+
+use core::time::Duration;
+
+use canopen_master::ds402::{self, Goal, State, StatusWord};
+use lb2::code::Failure;
+use pdo::Payload;
+use pdo::layout::ld2000::{Command, Feedback};
+
+use crate::failure;
+use crate::output::DriveSetpoint;
+
+/// Increments of 2^-20 turn a second for one unit of the drive's speed, 1875/262144 rpm.
+const INCREMENTS: i64 = 125;
+/// Without an actual value for so long, it is no longer extrapolated: three SYNC periods.
+const STALE: Duration = Duration::from_millis(30);
+
+/// What is known of a drive and wanted of it.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Drive {
+    control: ds402::Axis,
+    enable: bool,
+    feedback: Option<(Duration, Feedback)>,
+    lost: bool,
+    /// To be told to the axis with the next cycle.
+    failure: Option<Failure>,
+    faulty: bool,
+}
+
+impl Drive {
+    /// Takes an actual value.
+    pub(super) fn receive(&mut self, now: Duration, data: Payload) {
+        let Some(feedback) = Feedback::parse(data) else { return };
+        self.feedback = Some((now, feedback));
+        let status = StatusWord(feedback.status_word);
+        self.control.handle_status(now, status);
+        let faulty = matches!(status.state(), Some(State::Fault | State::FaultReactionActive));
+        if faulty && !core::mem::replace(&mut self.faulty, faulty) {
+            self.failure = Some(failure::DRIVE_FAULT);
+        }
+        self.faulty = faulty;
+    }
+
+    /// The position now, 24 bits: SYNC is slower than the control cycle, so between two actual values it
+    /// is extrapolated with the drive's own speed (project-defined).
+    pub(super) fn position(&self, now: Duration) -> Option<u32> {
+        let (at, feedback) = self.feedback?;
+        let age = now.saturating_sub(at);
+        let age = if age > STALE || self.lost { Duration::ZERO } else { age };
+        // At most 30 ms.
+        let micros = age.as_micros() as i64;
+        let moved = i64::from(feedback.speed) * INCREMENTS * micros / 1_000_000;
+        Some(feedback.position.wrapping_add(moved as u32) & 0xFF_FFFF)
+    }
+
+    /// What failed since the last cycle; a lost drive fails as long as it is lost.
+    pub(super) fn take_failure(&mut self) -> Option<Failure> {
+        self.failure.take()
+    }
+
+    /// Guarding says that the drive is lost, or is back.
+    pub(super) fn set_lost(&mut self, lost: bool) {
+        if lost && !self.lost {
+            self.failure = Some(failure::DRIVE_LOST);
+        }
+        self.lost = lost;
+        if lost {
+            // What comes back may be another drive, or the same after a loss of power.
+            self.enable = false;
+        }
+    }
+
+    /// The drive says by an emergency that it has a fault.
+    pub(super) const fn emergency(&mut self) {
+        if !core::mem::replace(&mut self.faulty, true) {
+            self.failure = Some(failure::DRIVE_FAULT);
+        }
+    }
+
+    /// The scan found it in another operating mode than digital speed.
+    pub(super) const fn wrong_mode(&mut self) {
+        self.failure = Some(failure::DRIVE_MODE);
+    }
+
+    /// What goes out in this cycle.
+    pub(super) fn command(&mut self, now: Duration, wanted: &DriveSetpoint) -> Payload {
+        while self.control.poll_event().is_some() {}
+        self.control.handle_timeout(now);
+        let enable = wanted.enable && !self.lost;
+        let goal = if wanted.reset && self.faulty {
+            Some(Goal::ResetFault)
+        } else if enable != self.enable && !self.faulty {
+            self.enable = enable;
+            Some(Goal::State(if enable { State::OperationEnabled } else { State::ReadyToSwitchOn }))
+        } else if self.faulty {
+            self.enable = false;
+            None
+        } else {
+            None
+        };
+        if let Some(goal) = goal {
+            // Events have been polled and these states can be reached by command.
+            let _ = self.control.go(now, goal);
+        }
+        let speed = if self.enable { wanted.speed } else { 0 };
+        Command { control_word: self.control.poll_control().0, speed }.encode()
+    }
+}
