@@ -89,17 +89,29 @@ impl Serial {
 #[serde(deny_unknown_fields)]
 pub(super) struct Can {
     endpoint: String,
-    #[serde(default = "bitrate")]
-    pub(super) bitrate: u32,
+    bitrate: Option<u32>,
 }
 
-const fn bitrate() -> u32 {
-    500_000
-}
+/// Bits per second of virtual buses.
+const VIRTUAL_BIT_RATE: u32 = 500_000;
 
 impl Can {
+    /// Where the bus is, with its bit rate where the endpoint sets one.
     pub(super) fn endpoint(&self) -> Result<CanEndpoint, Exit> {
-        self.endpoint.parse().map_err(|error| Exit::usage(format!("endpoint {:?}: {error}", self.endpoint)))
+        let mut endpoint = self
+            .endpoint
+            .parse()
+            .map_err(|error| Exit::usage(format!("endpoint {:?}: {error}", self.endpoint)))?;
+        match (&mut endpoint, self.bitrate) {
+            (CanEndpoint::Slcan { bit_rate, .. }, Some(rate)) => *bit_rate = rate,
+            (CanEndpoint::Virtual { .. }, Some(rate)) if rate != VIRTUAL_BIT_RATE => {
+                return Err(Exit::usage(format!(
+                    "{endpoint}: bitrate {rate}, virtual buses have {VIRTUAL_BIT_RATE}"
+                )));
+            }
+            _ => {}
+        }
+        Ok(endpoint)
     }
 }
 
@@ -264,6 +276,11 @@ impl Config {
             step.check()?;
         }
         for device in &self.simulate {
+            if let Simulated::Drive { node, .. } | Simulated::Io { node, .. } = device
+                && !(1..=127).contains(node)
+            {
+                return Err(Exit::usage(format!("a simulated device has node {node}, 1 to 127 expected")));
+            }
             match device {
                 Simulated::Plant(plant) if !(1..=3).contains(&plant.block) => {
                     return Err(Exit::usage(format!("plant: block {}, 1 to 3 expected", plant.block)));

@@ -1,5 +1,6 @@
 //! `motionctl run`: a soft MotionController in real time.
 
+mod buses;
 pub(crate) mod cli;
 mod config;
 mod pace;
@@ -23,7 +24,8 @@ use crate::can::stop_flag;
 use crate::exit::Exit;
 use crate::output::Output;
 use crate::storage::FileStorage;
-use config::{ComPort, Config};
+use buses::{Bus, Devices};
+use config::{BusName, ComPort, Config};
 use pace::Pace;
 use program::Program;
 use report::Report;
@@ -98,6 +100,13 @@ fn control(
         }
         lines.push((endpoint.to_string(), Line::new(port)));
     }
+    let mut connected = Vec::new();
+    for (at, name) in [BusName::Can1, BusName::Can2].into_iter().enumerate() {
+        if let Some(can) = config.can(name) {
+            connected.push((at, Bus::connect(&can.endpoint()?)?));
+        }
+    }
+    let _devices = Devices::start(config)?;
     for missing in pace::real_time() {
         out.remark(missing);
     }
@@ -112,8 +121,19 @@ fn control(
         let cycle = controller.cycle_time();
         let now = pace.wait(cycle);
         program.advance(now);
+        for (at, port) in &connected {
+            if let Some(bus) = controller.bus(*at) {
+                port.receive(now, bus, |event| report.bus(now, *at, &event.to_string()))?;
+            }
+        }
         let inputs = machine.run(cycle.as_millis() as u32, &outputs);
         outputs = controller.cycle(now, &inputs, &mut program);
+        for (at, port) in &connected {
+            if let Some(bus) = controller.bus(*at) {
+                port.send(now, bus);
+                report.nodes(now, *at, bus);
+            }
+        }
         for (name, line) in &mut lines {
             line.serve(now, &mut controller).map_err(|error| Exit::file(name, &error))?;
         }

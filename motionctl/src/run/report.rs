@@ -2,8 +2,10 @@
 
 use core::time::Duration;
 
+use canopen_master::NodeSet;
 use lb2::code::StoredFailure;
 use motion_core::application::{AxisStatus, State};
+use motion_core::bus::CanBus;
 use motion_core::failure;
 use serde_json::{Value, json};
 
@@ -27,13 +29,21 @@ const fn state_name(state: State) -> &'static str {
 pub(super) struct Report<'a> {
     out: &'a Output,
     states: [State; 6],
+    /// Nodes that have booted, by bus.
+    ready: [NodeSet; 2],
     summary: Duration,
     cycles: u64,
 }
 
 impl<'a> Report<'a> {
     pub(super) const fn new(out: &'a Output) -> Self {
-        Self { out, states: [State::Disabled; 6], summary: Duration::from_secs(1), cycles: 0 }
+        Self {
+            out,
+            states: [State::Disabled; 6],
+            ready: [NodeSet::EMPTY; 2],
+            summary: Duration::from_secs(1),
+            cycles: 0,
+        }
     }
 
     fn event(&self, at: Duration, event: &str, mut fields: Value, text: &str) {
@@ -57,6 +67,25 @@ impl<'a> Report<'a> {
         let text = format!("axis {number}: {name} at {}", status.position);
         let fields = json!({ "axis": number, "state": name, "position": status.position });
         self.event(at, "axis", fields, &text);
+    }
+
+    pub(super) fn bus(&self, at: Duration, bus: usize, text: &str) {
+        let number = bus + 1;
+        self.event(at, "bus", json!({ "bus": number, "text": text }), &format!("CAN {number}: {text}"));
+    }
+
+    /// Nodes that have booted, or are to boot anew.
+    pub(super) fn nodes(&mut self, at: Duration, bus: usize, can: &CanBus) {
+        let before = core::mem::replace(&mut self.ready[bus], can.ready());
+        let number = bus + 1;
+        let changes =
+            [("node", "ready", can.ready().without(before)), ("node", "gone", before.without(can.ready()))];
+        for (event, word, nodes) in changes {
+            for node in nodes.iter() {
+                let fields = json!({ "bus": number, "node": node.raw(), "state": word });
+                self.event(at, event, fields, &format!("CAN {number}: node {node} is {word}"));
+            }
+        }
     }
 
     pub(super) fn failure(&self, at: Duration, stored: StoredFailure) {
