@@ -8,6 +8,7 @@ extern crate alloc;
 extern crate std;
 
 pub mod boot;
+mod bus;
 pub mod data_type;
 pub mod ds401;
 pub mod ds402;
@@ -30,5 +31,6 @@ pub mod time;
 #[cfg(feature = "alloc")]
 pub mod trace;
 
+pub use bus::BusStatus;
 pub use node_set::NodeSet;
 pub use pdo::{Address, Frame, Handled, NodeId};

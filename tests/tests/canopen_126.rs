@@ -51,6 +51,8 @@ impl Access for Objects {
     }
 }
 
+impl slave::Objects for Objects {}
+
 enum Station {
     Master { master: Box<Master<'static, Vec<u8>, 127>>, events: Vec<Event<Vec<u8>>>, pdos: u64 },
     Slave { slave: Box<Slave<Objects>>, present: bool, pdo: Option<Frame>, sent: u64 },

@@ -4,6 +4,7 @@ use pdo::NodeId;
 
 use super::NmtTicket;
 use crate::boot::{Booted, Failure};
+use crate::bus::BusStatus;
 use crate::emcy::Emergency;
 use crate::nmt::{Command, State};
 use crate::node_set::NodeSet;
@@ -117,30 +118,6 @@ impl<B> From<Notice> for Event<B> {
             Notice::TransmitFull => Self::TransmitFull,
             Notice::Discarded(frames) => Self::Discarded(frames),
         }
-    }
-}
-
-/// The adapter's state, as its driver tells it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
-pub enum BusStatus {
-    /// Error active.
-    #[default]
-    Active,
-    /// An error counter has reached 96.
-    Warning,
-    /// Error passive.
-    Passive,
-    /// Bus-off: nothing is sent or received until it recovers.
-    Off,
-    /// The adapter is not there.
-    Unplugged,
-}
-
-impl BusStatus {
-    /// Whether frames can be sent.
-    #[must_use]
-    pub const fn is_on(self) -> bool {
-        matches!(self, Self::Active | Self::Warning | Self::Passive)
     }
 }
 

@@ -63,8 +63,7 @@ impl<'d, B: Buffer, const N: usize> Master<'d, B, N> {
 
     fn job_transfer(&mut self, id: NodeId, at: Address, write: Option<Data<'d, B>>, timeout: Duration) {
         let Some(node) = self.node_mut(id) else { return };
-        #[allow(clippy::needless_update)]
-        let options = sdo::Options { timeout, ..sdo::Options::default() };
+        let options = sdo::Options::new(timeout);
         let begun = match write {
             Some(data) => node.sdo.download(at, data, &options),
             None => node.sdo.upload(at, Data::Head(Head::default()), &options),

@@ -21,7 +21,8 @@ use crate::scan::{self, BusState, Info};
 use crate::sdo::Buffer;
 use crate::{lss, sync};
 
-pub use event::{BusStatus, Event, Refused, SubmitError};
+pub use crate::bus::BusStatus;
+pub use event::{Event, Refused, SubmitError};
 pub use node::Image;
 
 use event::Notice;

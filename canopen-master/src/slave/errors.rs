@@ -50,6 +50,13 @@ impl Errors {
         self.producer.push(Emergency { code, register, data })
     }
 
+    /// An error that is over as soon as it is told, such as a PDO that was too short.
+    pub(super) fn mention(&mut self, code: ErrorCode, data: [u8; 5]) {
+        let register = self.register() | code.register_bit();
+        // The history has it, even where too many wait.
+        let _ = self.producer.push(Emergency { code, register, data });
+    }
+
     pub(super) fn clear(&mut self, code: ErrorCode) -> Result<(), ProducerFull> {
         let Some(slot) = self.active.iter_mut().find(|slot| **slot == Some(code)) else { return Ok(()) };
         *slot = None;

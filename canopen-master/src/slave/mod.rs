@@ -1,29 +1,32 @@
-//! A whole slave: NMT, SDO server over an object dictionary, guarding, heartbeat, SYNC, TIME, EMCY
-//! and LSS behind one dispatch.
+//! A whole slave: NMT, SDO server over an object dictionary, PDOs, guarding, heartbeat, SYNC, TIME,
+//! EMCY and LSS behind one dispatch.
 //!
-//! The dictionary is anything that an SDO server can serve ([`Access`]). What it holds in the
+//! The dictionary is anything that implements [`Objects`]. What it holds in the
 //! communication area takes effect when the slave boots and when it is written: 1005h, 1006h, 1019h
 //! (SYNC), 100Ch, 100Dh (guarding), 1014h, 1015h (EMCY), 1016h, 1017h (heartbeat), 1029h (error
 //! behaviour). Objects that are not there have their defaults. 1001h and 1003h are the slave's own.
 
 mod errors;
 mod objects;
+mod process;
 
 use core::time::Duration;
 
 use embedded_can::Id;
-use pdo::{Address, CobId, Frame, Handled, NodeId, cob};
+use pdo::{Address, CobId, Frame, Handled, NodeId, RpdoEvent, cob};
 
+use crate::bus::BusStatus;
 use crate::emcy::{self, Emergency, ErrorCode};
 use crate::heartbeat::{self, Consumer, Producer};
 use crate::lss::{self, BitTiming, Identity};
 use crate::nmt::{self, Change, Command, State};
 use crate::ring::Ring;
-use crate::sdo::{Access, Channel, Server};
+use crate::sdo::{Channel, Server};
 use crate::time::TimeOfDay;
 use crate::{guarding, sync};
 
 pub use errors::EMERGENCIES;
+pub use process::Objects;
 
 use errors::Errors;
 use objects::{View, number};
@@ -79,8 +82,10 @@ pub enum Event {
         /// What happened.
         event: heartbeat::Event,
     },
-    /// SYNC.
+    /// SYNC. Of PDOs, those that it sets free have been written to the dictionary.
     Sync(sync::Event),
+    /// An RPDO: its number, from 0, and what happened; its data are in the dictionary.
+    Rpdo(usize, RpdoEvent),
     /// TIME.
     Time(TimeOfDay),
     /// What LSS asks of the device. After [`lss::Action::Store`], call [`Slave::stored`].
@@ -93,7 +98,8 @@ pub enum Event {
 ///
 /// - Commands: [`boot`](Self::boot), [`raise`](Self::raise), [`clear`](Self::clear),
 ///   [`stored`](Self::stored).
-/// - Input: [`handle_frame`](Self::handle_frame), [`handle_timeout`](Self::handle_timeout).
+/// - Input: [`handle_frame`](Self::handle_frame), [`handle_timeout`](Self::handle_timeout),
+///   and from the adapter [`handle_bus`](Self::handle_bus).
 /// - Output: [`poll_transmit`](Self::poll_transmit), [`poll_event`](Self::poll_event),
 ///   [`poll_timeout`](Self::poll_timeout).
 /// - Getters: [`node`](Self::node), [`state`](Self::state), [`objects`](Self::objects), …
@@ -117,9 +123,10 @@ pub struct Slave<D> {
     boot_up: Option<Frame>,
     events: Ring<Event, EVENTS>,
     lost_events: u32,
+    bus: BusStatus,
 }
 
-impl<D: Access> Slave<D> {
+impl<D: Objects> Slave<D> {
     /// A silent slave.
     #[must_use]
     pub fn new(config: &Config<'_>, objects: D) -> Self {
@@ -140,6 +147,7 @@ impl<D: Access> Slave<D> {
             boot_up: None,
             events: Ring::new(),
             lost_events: 0,
+            bus: BusStatus::Active,
         }
     }
 
@@ -177,6 +185,7 @@ impl<D: Access> Slave<D> {
     /// pre-operational. Returns whether it did: not without an address.
     pub fn boot(&mut self, now: Duration) -> bool {
         self.lss.restart();
+        self.objects.stop();
         let Some(node) = self.lss.node() else {
             self.running = false;
             return false;
@@ -185,13 +194,8 @@ impl<D: Access> Slave<D> {
         self.boot_up = Some(self.nmt.boot());
         self.running = true;
         self.answers = Ring::new();
-        let mut view = View {
-            dictionary: &mut self.objects,
-            register: 0,
-            emergencies: self.errors.producer(),
-            written: None,
-        };
-        self.server.reset(Channel::default_of(node), &mut view);
+        let (server, mut view) = self.serving();
+        server.reset(Channel::default_of(node), &mut view);
         self.guard = guarding::Slave::new(node, None);
         self.producer = Producer::new(node, 0, now);
         self.consumers = [None; CONSUMERS];
@@ -243,7 +247,7 @@ impl<D: Access> Slave<D> {
             cob::NMT => {
                 let change =
                     Command::parse(&frame).and_then(|(command, target)| self.nmt.handle(command, target));
-                self.on_change(change);
+                self.on_change(now, change);
                 Handled::Taken
             }
             cob::TIME if self.state().has_sdo() => {
@@ -267,21 +271,94 @@ impl<D: Access> Slave<D> {
                 }
                 Handled::Taken
             }
-            _ => self.on_heartbeat(now, id, &frame),
+            cob::ERROR_CONTROL.. => self.on_heartbeat(now, id, &frame),
+            _ if self.state().has_pdo() => {
+                let handled = self.objects.handle_frame(now, &frame);
+                self.collect_pdos();
+                handled
+            }
+            _ => Handled::Ignored,
         }
+    }
+
+    /// What RPDOs brought.
+    fn collect_pdos(&mut self) {
+        while let Some((number, event)) = self.objects.poll_event() {
+            let index = (0x1600 + number as u16).to_le_bytes();
+            match event {
+                RpdoEvent::TooShort(error) => {
+                    let data = [index[0], index[1], error.expected, error.found, 0];
+                    self.errors.mention(ErrorCode::PDO_LENGTH, data);
+                }
+                RpdoEvent::TooLong(error) => {
+                    let data = [index[0], index[1], error.expected, error.found, 0];
+                    self.errors.mention(ErrorCode::PDO_TOO_LONG, data);
+                }
+                RpdoEvent::TimedOut => {
+                    self.errors.mention(ErrorCode::RPDO_TIMEOUT, [index[0], index[1], 0, 0, 0]);
+                }
+                _ => {}
+            }
+            self.tell(Event::Rpdo(number, event));
+        }
+    }
+
+    /// The NMT state has changed.
+    fn entered(&mut self, now: Duration, state: State) {
+        if state.has_pdo() {
+            self.objects.start(now);
+        } else {
+            self.objects.stop();
+        }
+        self.tell(Event::State(state));
+    }
+
+    /// The adapter's state has changed. While the bus is not there, nothing is sent; what waited is
+    /// dropped. Error passive and the recovery from bus-off are told by emergencies (8120h, 8140h).
+    pub fn handle_bus(&mut self, now: Duration, status: BusStatus) {
+        let before = core::mem::replace(&mut self.bus, status);
+        match (before, status) {
+            (_, BusStatus::Passive) => {
+                let _ = self.errors.raise(ErrorCode::CAN_PASSIVE, [0; 5]);
+            }
+            (BusStatus::Passive, BusStatus::Active | BusStatus::Warning) => {
+                let _ = self.errors.clear(ErrorCode::CAN_PASSIVE);
+            }
+            (BusStatus::Off, BusStatus::Active | BusStatus::Warning) => {
+                let _ = self.errors.clear(ErrorCode::CAN_PASSIVE);
+                self.errors.mention(ErrorCode::BUS_OFF_RECOVERED, [0; 5]);
+            }
+            _ => {}
+        }
+        if before.is_on() && !status.is_on() {
+            self.answers = Ring::new();
+            let channel = self.server.channel();
+            let (server, mut view) = self.serving();
+            server.reset(channel, &mut view);
+        } else if status.is_on() && !before.is_on() && self.producer.time_ms() != 0 {
+            let time = self.producer.time_ms();
+            self.producer.set_time(time, now);
+        }
+    }
+
+    /// The SDO server and what it serves.
+    fn serving(&mut self) -> (&mut Server, View<'_, D, EMERGENCIES>) {
+        let register = self.errors.register();
+        let view = View {
+            dictionary: &mut self.objects,
+            register,
+            emergencies: self.errors.producer(),
+            written: None,
+        };
+        (&mut self.server, view)
     }
 
     fn on_sdo<F: embedded_can::Frame>(&mut self, now: Duration, frame: &F) -> Handled {
         if !self.nmt.state().has_sdo() {
             return Handled::Taken;
         }
-        let mut view = View {
-            dictionary: &mut self.objects,
-            register: self.errors.register(),
-            emergencies: self.errors.producer(),
-            written: None,
-        };
-        let handled = self.server.handle_frame(now, frame, &mut view);
+        let (server, mut view) = self.serving();
+        let handled = server.handle_frame(now, frame, &mut view);
         if let Some(at) = view.written {
             self.configure(now, at.index);
             self.tell(Event::Written(at));
@@ -304,11 +381,12 @@ impl<D: Access> Slave<D> {
         Handled::Taken
     }
 
-    fn on_change(&mut self, change: Option<Change>) {
+    fn on_change(&mut self, now: Duration, change: Option<Change>) {
         match change {
-            Some(Change::State(state)) => self.tell(Event::State(state)),
+            Some(Change::State(state)) => self.entered(now, state),
             Some(reset) => {
                 self.running = false;
+                self.objects.stop();
                 self.boot_up = None;
                 self.answers = Ring::new();
                 self.tell(match reset {
@@ -322,7 +400,16 @@ impl<D: Access> Slave<D> {
 
     fn on_sync(&mut self, event: sync::Event) {
         if matches!(event, sync::Event::Length { .. }) {
-            let _ = self.errors.raise(ErrorCode::SYNC_LENGTH, [0; 5]);
+            self.errors.mention(ErrorCode::SYNC_LENGTH, [0; 5]);
+        }
+        let counter = match event {
+            sync::Event::Sync { counter } => Some(counter),
+            sync::Event::Jump { found, .. } => Some(Some(found)),
+            _ => None,
+        };
+        if let Some(counter) = counter.filter(|_| self.state().has_pdo()) {
+            self.objects.handle_sync(counter);
+            self.collect_pdos();
         }
         self.tell(Event::Sync(event));
     }
@@ -346,16 +433,13 @@ impl<D: Access> Slave<D> {
         if !self.running {
             return;
         }
-        let mut view = View {
-            dictionary: &mut self.objects,
-            register: self.errors.register(),
-            emergencies: self.errors.producer(),
-            written: None,
-        };
-        self.server.handle_timeout(now, &mut view);
+        let (server, mut view) = self.serving();
+        server.handle_timeout(now, &mut view);
+        self.objects.handle_timeout(now);
+        self.collect_pdos();
         if let Some(event) = self.guard.handle_timeout(now) {
             self.tell(Event::LifeGuarding(event));
-            self.on_lost();
+            self.on_lost(now);
         }
         for index in 0..CONSUMERS {
             let Some((node, consumer)) = self.consumers.get_mut(index).and_then(Option::as_mut) else {
@@ -364,7 +448,7 @@ impl<D: Access> Slave<D> {
             let node = *node;
             if let Some(event) = consumer.handle_timeout(now) {
                 self.tell(Event::Heartbeat { node, event });
-                self.on_lost();
+                self.on_lost(now);
             }
         }
         if let Some(event) = self.sync.handle_timeout(now) {
@@ -374,7 +458,7 @@ impl<D: Access> Slave<D> {
 
     /// The master, or a node watched, is gone: emergency 8130h, and what 1029h:01 says (CiA 301,
     /// 7.5.2.26).
-    fn on_lost(&mut self) {
+    fn on_lost(&mut self, now: Duration) {
         let _ = self.errors.raise(ErrorCode::LIFE_GUARD, [0; 5]);
         let next = match number(&mut self.objects, 0x1029, 1).map(|behaviour| behaviour as u8) {
             None | Some(0) if self.state() == State::Operational => State::PreOperational,
@@ -382,13 +466,16 @@ impl<D: Access> Slave<D> {
             _ => return,
         };
         if self.nmt.enter(next) {
-            self.tell(Event::State(next));
+            self.entered(now, next);
         }
     }
 
     /// The next frame to send, until `None`.
     #[inline]
     pub fn poll_transmit(&mut self, now: Duration) -> Option<Frame> {
+        if !self.bus.is_on() {
+            return None;
+        }
         if let Some(frame) = self.boot_up.take().or_else(|| self.answers.pop()) {
             return Some(frame);
         }
@@ -402,13 +489,11 @@ impl<D: Access> Slave<D> {
             {
                 return emergency_frame(id, &emergency);
             }
-            let mut view = View {
-                dictionary: &mut self.objects,
-                register: self.errors.register(),
-                emergencies: self.errors.producer(),
-                written: None,
-            };
-            if let Some(frame) = self.server.poll_transmit(now, &mut view) {
+            if let Some(frame) = self.objects.poll_transmit(now).filter(|_| state.has_pdo()) {
+                return Some(frame);
+            }
+            let (server, mut view) = self.serving();
+            if let Some(frame) = server.poll_transmit(now, &mut view) {
                 return Some(frame);
             }
         }
@@ -422,12 +507,15 @@ impl<D: Access> Slave<D> {
         if !self.running {
             return None;
         }
-        let emcy = self.emcy_id.filter(|_| self.state().has_sdo()).and_then(|_| self.errors.poll_timeout());
+        let on = self.bus.is_on();
+        let emcy =
+            self.emcy_id.filter(|_| on && self.state().has_sdo()).and_then(|_| self.errors.poll_timeout());
         let consumers = self.consumers.iter().flatten().filter_map(|(_, consumer)| consumer.poll_timeout());
         [
             self.server.poll_timeout(),
             self.guard.poll_timeout(),
-            self.producer.poll_timeout(),
+            self.producer.poll_timeout().filter(|_| on),
+            self.objects.poll_timeout().filter(|_| on && self.state().has_pdo()),
             self.sync.poll_timeout(),
             emcy,
         ]

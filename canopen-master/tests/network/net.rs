@@ -56,6 +56,8 @@ impl Access for Dictionary {
     }
 }
 
+impl slave::Objects for Dictionary {}
+
 /// A drive as manual A's LD 2000 shows itself.
 pub(crate) fn drive(identity: Identity) -> Dictionary {
     let mut objects = Dictionary::default();
