@@ -6,6 +6,7 @@
 //! (SYNC), 100Ch, 100Dh (guarding), 1014h, 1015h (EMCY), 1016h, 1017h (heartbeat), 1029h (error
 //! behaviour). Objects that are not there have their defaults. 1001h and 1003h are the slave's own.
 
+mod device;
 mod errors;
 mod objects;
 mod process;
@@ -25,6 +26,7 @@ use crate::sdo::{Channel, Server};
 use crate::time::TimeOfDay;
 use crate::{guarding, sync};
 
+pub use device::Device;
 pub use errors::EMERGENCIES;
 pub use process::Objects;
 
