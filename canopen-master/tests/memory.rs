@@ -2,9 +2,10 @@
 
 #![allow(unsafe_code, reason = "an allocator that counts")]
 
+use core::alloc::{GlobalAlloc, Layout};
+use core::cell::Cell;
 use core::time::Duration;
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
+use std::alloc::System;
 
 use canopen_master::boot::{Booted, ConciseDcf, Config as BootConfig, ErrorControl};
 use canopen_master::data_type::DataType;
@@ -106,7 +107,7 @@ fn exchange<const N: usize>(
             slave.handle_frame(now, &frame);
         } else if let Some(frame) = slave.poll_transmit(now) {
             master.handle_frame(now, &frame);
-        } else if !slave.objects().pdos.poll_timeout().is_some_and(|at| at <= now) {
+        } else if slave.objects().pdos.poll_timeout().is_none_or(|at| at > now) {
             return frames;
         }
         frames += 1;
