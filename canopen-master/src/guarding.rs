@@ -35,7 +35,13 @@ impl Config {
     /// After what silence the other side is lost.
     #[must_use]
     pub fn life_time(self) -> Duration {
-        self.period().saturating_mul(u32::from(self.life_time_factor.max(1)))
+        Duration::from_millis(u64::from(self.life_time_ms()))
+    }
+
+    /// The same in ms.
+    #[must_use]
+    pub fn life_time_ms(self) -> u32 {
+        u32::from(self.period_ms.max(1)) * u32::from(self.life_time_factor.max(1))
     }
 }
 

@@ -4,6 +4,7 @@ use core::time::Duration;
 
 use pdo::{Frame, NodeId, cob};
 
+use crate::clock::after_ms;
 use crate::nmt::State;
 
 /// Sends a node's state every so often.
@@ -19,7 +20,7 @@ impl Producer {
     /// A producer that first sends one period after `now`; a period of 0 ms is off.
     #[must_use]
     pub fn new(node: NodeId, time_ms: u16, now: Duration) -> Self {
-        Self { node, time_ms, next: now.saturating_add(Duration::from_millis(u64::from(time_ms))) }
+        Self { node, time_ms, next: after_ms(now, time_ms) }
     }
 
     /// The period in ms, 0 = off.
@@ -38,10 +39,9 @@ impl Producer {
         if self.time_ms == 0 || now < self.next {
             return None;
         }
-        let period = Duration::from_millis(u64::from(self.time_ms));
-        self.next = self.next.saturating_add(period);
+        self.next = after_ms(self.next, self.time_ms);
         if self.next <= now {
-            self.next = now.saturating_add(period);
+            self.next = after_ms(now, self.time_ms);
         }
         Some(Frame::standard(cob::ERROR_CONTROL + u16::from(self.node.raw()), [state as u8]))
     }
@@ -117,8 +117,7 @@ impl Consumer {
     /// When the consumer time ends; `None` = not watching.
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Duration> {
-        (self.active && !self.lost)
-            .then(|| self.last.saturating_add(Duration::from_millis(u64::from(self.time_ms))))
+        (self.active && !self.lost).then(|| after_ms(self.last, self.time_ms))
     }
 }
 

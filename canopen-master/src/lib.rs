@@ -9,6 +9,7 @@ extern crate std;
 
 pub mod boot;
 mod bus;
+mod clock;
 pub mod data_type;
 pub mod ds401;
 pub mod ds402;

@@ -6,101 +6,121 @@ use pdo::NodeId;
 
 /// Any of the 127 nodes, 16 bytes.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub struct NodeSet(u128);
+pub struct NodeSet([u32; 4]);
 
 impl NodeSet {
     /// No node.
-    pub const EMPTY: Self = Self(0);
+    pub const EMPTY: Self = Self([0; 4]);
     /// Nodes 1…127.
-    pub const ALL: Self = Self(!1);
+    pub const ALL: Self = Self([!1, !0, !0, !0]);
 
     /// Nodes 1 to `last`.
     #[must_use]
-    pub const fn up_to(last: NodeId) -> Self {
-        Self(Self::ALL.0 & (u128::MAX >> (127 - last.raw())))
+    pub fn up_to(last: NodeId) -> Self {
+        NodeId::all().take(usize::from(last.raw())).collect()
     }
 
     /// One node.
     #[must_use]
     pub const fn of(node: NodeId) -> Self {
-        Self(1 << node.raw())
+        let mut set = Self::EMPTY;
+        set.insert(node);
+        set
     }
 
     /// Whether no node is in it.
     #[must_use]
     pub const fn is_empty(self) -> bool {
-        self.0 == 0
+        let [a, b, c, d] = self.0;
+        a | b | c | d == 0
     }
 
     /// How many nodes are in it, 0…127.
     #[must_use]
-    pub const fn len(self) -> usize {
-        self.0.count_ones() as usize
+    pub fn len(self) -> usize {
+        self.0.iter().map(|word| word.count_ones() as usize).sum()
     }
 
     /// Whether a node is in it.
     #[must_use]
     pub const fn contains(self, node: NodeId) -> bool {
-        self.0 & Self::of(node).0 != 0
+        self.0[Self::word(node)] & Self::bit(node) != 0
     }
 
     /// Puts a node in.
     pub const fn insert(&mut self, node: NodeId) {
-        self.0 |= Self::of(node).0;
+        self.0[Self::word(node)] |= Self::bit(node);
     }
 
     /// Takes a node out; whether it was in.
     pub const fn remove(&mut self, node: NodeId) -> bool {
         let was = self.contains(node);
-        self.0 &= !Self::of(node).0;
+        self.0[Self::word(node)] &= !Self::bit(node);
         was
     }
 
     /// Nodes in both.
     #[must_use]
     pub const fn and(self, other: Self) -> Self {
-        Self(self.0 & other.0)
+        let ([a, b, c, d], [e, f, g, h]) = (self.0, other.0);
+        Self([a & e, b & f, c & g, d & h])
     }
 
     /// Nodes in either.
     #[must_use]
     pub const fn or(self, other: Self) -> Self {
-        Self(self.0 | other.0)
+        let ([a, b, c, d], [e, f, g, h]) = (self.0, other.0);
+        Self([a | e, b | f, c | g, d | h])
     }
 
     /// Nodes in this one only.
     #[must_use]
     pub const fn without(self, other: Self) -> Self {
-        Self(self.0 & !other.0)
+        let ([a, b, c, d], [e, f, g, h]) = (self.0, other.0);
+        Self([a & !e, b & !f, c & !g, d & !h])
     }
 
     /// The lowest.
     #[must_use]
-    pub const fn first(self) -> Option<NodeId> {
-        if self.0 == 0 {
-            return None;
-        }
-        match NodeId::new(self.0.trailing_zeros() as u8) {
-            Ok(node) => Some(node),
-            Err(_) => None,
-        }
+    pub fn first(self) -> Option<NodeId> {
+        let (word, bits) = (0..).zip(self.0).find(|(_, bits)| *bits != 0)?;
+        NodeId::new(32 * word + bits.trailing_zeros() as u8).ok()
     }
 
     /// The lowest above `node`, and after the highest the lowest again: for taking turns.
     #[must_use]
-    pub const fn after(self, node: NodeId) -> Option<NodeId> {
-        let above = Self(self.0 & (u128::MAX << node.raw() << 1));
-        match above.first() {
-            None => self.first(),
-            found => found,
+    pub fn after(self, node: NodeId) -> Option<NodeId> {
+        let mut above = self;
+        let split = Self::word(node);
+        for (word, bits) in above.0.iter_mut().enumerate() {
+            if word < split {
+                *bits = 0;
+            } else if word == split {
+                *bits &= !(Self::bit(node) | (Self::bit(node) - 1));
+            }
         }
+        above.first().or_else(|| self.first())
     }
 
     /// Takes the lowest out.
-    pub const fn pop(&mut self) -> Option<NodeId> {
-        let first = self.first();
-        self.0 &= self.0.wrapping_sub(1);
-        first
+    pub fn pop(&mut self) -> Option<NodeId> {
+        for (word, bits) in (0..).zip(&mut self.0) {
+            if *bits != 0 {
+                let lowest = bits.trailing_zeros() as u8;
+                *bits &= *bits - 1;
+                return NodeId::new(32 * word + lowest).ok();
+            }
+        }
+        None
+    }
+
+    /// A node ID is below 128: this is in the array.
+    const fn word(node: NodeId) -> usize {
+        (node.raw() >> 5 & 3) as usize
+    }
+
+    const fn bit(node: NodeId) -> u32 {
+        1 << (node.raw() & 31)
     }
 
     /// In order.

@@ -39,13 +39,12 @@ impl<'d, B: Buffer, const N: usize> Master<'d, B, N> {
             older.missing = older.missing.or(older.waiting.and(waiting));
             older.waiting = older.waiting.without(waiting);
         }
-        let shows_after = |id| {
-            let node = self.node(id)?;
-            let heartbeat = node.heartbeat.map(|consumer| Duration::from_millis(consumer.time_ms().into()));
-            let guard = node.guard.map(|guard| guard.config().life_time());
-            heartbeat.max(guard)
-        };
-        let longest = waiting.iter().filter_map(shows_after).max().unwrap_or_default();
+        let mut longest = 0;
+        for node in waiting.iter().filter_map(|id| self.node(id)) {
+            let heartbeat = node.heartbeat.map_or(0, |consumer| consumer.time_ms().into());
+            longest = longest.max(heartbeat).max(node.guard.map_or(0, |guard| guard.config().life_time_ms()));
+        }
+        let longest = Duration::from_millis(longest.into());
         let deadline = now.saturating_add(self.config.confirm.max(longest));
         let ask = (!command.is_reset()).then(|| now.saturating_add(self.config.confirm / 2));
         if let Some(slot) = self.nmt.get_mut(slot) {

@@ -13,6 +13,7 @@ use core::time::Duration;
 use pdo::cob::DefaultPdo;
 use pdo::{Frame, NodeId};
 
+use crate::clock::earlier;
 use crate::emcy::History;
 use crate::nmt::{Command, State};
 use crate::node_set::NodeSet;
@@ -346,7 +347,7 @@ impl<'d, B: Buffer, const N: usize> Master<'d, B, N> {
 
     /// A deadline has been set.
     fn due(&mut self, at: Option<Duration>) {
-        self.bound = [self.bound, at].into_iter().flatten().min();
+        self.bound = earlier(self.bound, at);
     }
 
     /// What happened, until `None`.

@@ -5,6 +5,7 @@ use core::time::Duration;
 use pdo::NodeId;
 
 use crate::boot::{Booted, Failure, Process};
+use crate::clock::earliest;
 use crate::guarding::Guard;
 use crate::heartbeat::Consumer;
 use crate::nmt::State;
@@ -141,6 +142,6 @@ impl<B: Buffer> Node<'_, B> {
             Job::Boot(process) => process.deadline(),
             _ => None,
         };
-        [guard, heartbeat, boot, self.sdo.poll_timeout()].into_iter().flatten().min()
+        earliest(&[guard, heartbeat, boot, self.sdo.poll_timeout()])
     }
 }

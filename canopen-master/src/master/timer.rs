@@ -8,6 +8,7 @@ use super::event::Notice;
 use super::node::Job;
 use super::{BusStatus, Master};
 use crate::boot::Action;
+use crate::clock::{earlier, earliest};
 use crate::node_set::NodeSet;
 use crate::sdo::Buffer;
 
@@ -42,15 +43,15 @@ impl<B: Buffer, const N: usize> Master<'_, B, N> {
     pub fn poll_timeout(&self) -> Option<Duration> {
         let on = self.bus.is_on();
         let sync = self.sync.as_ref().filter(|_| on).map(crate::sync::Producer::poll_timeout);
-        [self.bound, sync, self.scan_due(), self.lss.poll_timeout()].into_iter().flatten().min()
+        earliest(&[self.bound, sync, self.scan_due(), self.lss.poll_timeout()])
     }
 
     fn node_timeout(&mut self, now: Duration, id: NodeId) {
         let on = self.bus.is_on();
         let Some(node) = self.node_mut(id) else { return };
-        if node.poll_timeout(on).is_none_or(|at| now < at) {
-            let at = node.poll_timeout(on);
-            return self.due(at);
+        let next = node.poll_timeout(on);
+        if next.is_none_or(|next| now < next) {
+            return self.due(next);
         }
         if let Job::Boot(process) = &mut node.job {
             let action = process.on_timeout(now);
@@ -97,7 +98,7 @@ impl<B: Buffer, const N: usize> Master<'_, B, N> {
                 ask = ask.or(job.waiting);
             }
             waiting = waiting.or(job.waiting);
-            bound = [bound, job.ask.or(Some(job.deadline))].into_iter().flatten().min();
+            bound = earlier(bound, job.ask.or(Some(job.deadline)));
         }
         self.nmt_waiting = waiting;
         let unwatched =

@@ -17,6 +17,7 @@ use embedded_can::Id;
 use pdo::{Address, CobId, Frame, Handled, NodeId, RpdoEvent, cob};
 
 use crate::bus::BusStatus;
+use crate::clock::{earlier, earliest};
 use crate::emcy::{self, Emergency, ErrorCode};
 use crate::heartbeat::{self, Consumer, Producer};
 use crate::lss::{self, BitTiming, Identity};
@@ -512,19 +513,16 @@ impl<D: Objects> Slave<D> {
         let on = self.bus.is_on();
         let emcy =
             self.emcy_id.filter(|_| on && self.state().has_sdo()).and_then(|_| self.errors.poll_timeout());
-        let consumers = self.consumers.iter().flatten().filter_map(|(_, consumer)| consumer.poll_timeout());
-        [
+        let own = earliest(&[
             self.server.poll_timeout(),
             self.guard.poll_timeout(),
             self.producer.poll_timeout().filter(|_| on),
             self.objects.poll_timeout().filter(|_| on && self.state().has_pdo()),
             self.sync.poll_timeout(),
             emcy,
-        ]
-        .into_iter()
-        .flatten()
-        .chain(consumers)
-        .min()
+        ]);
+        let consumers = self.consumers.iter().flatten().map(|(_, consumer)| consumer.poll_timeout());
+        consumers.fold(own, earlier)
     }
 
     /// What happened, until `None`.
