@@ -1,0 +1,655 @@
+//! The reader, line by line.
+
+use crate::curve::{CurveError, INFO_WORDS, InfoBlock};
+use crate::upid::{Layer, TreeIdentity, Upid};
+
+/// What a line brings.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Event {
+    /// Rows of a layer's parameters begin.
+    Section {
+        /// Its layer; `None` where the file names none that exists.
+        layer: Option<Layer>,
+        /// For the compatibility rules.
+        identity: TreeIdentity,
+    },
+    /// A parameter row.
+    Parameter {
+        /// First column of interest.
+        upid: Upid,
+        /// Second column of interest.
+        value: u32,
+    },
+    /// The object with the layer's parameters ends.
+    EndSection {
+        /// Rows that were read.
+        parameters: usize,
+    },
+    /// A curve's info block is complete; its setpoints follow.
+    Curve(InfoBlock),
+    /// A setpoint of the last curve.
+    Setpoint(i32),
+    /// The curve ends.
+    EndCurve {
+        /// Setpoints that were read.
+        setpoints: usize,
+    },
+    /// Something is wrong with a line, or with what ends there.
+    Problem {
+        /// Line number, counted from 1.
+        line: usize,
+        /// Whether the file can be used.
+        severity: Severity,
+        /// What.
+        problem: Problem,
+    },
+}
+
+/// How bad a problem is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Severity {
+    /// Read all the same.
+    Warning,
+    /// What it concerns was not read.
+    Error,
+}
+
+/// What is wrong.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Problem {
+    /// The file does not begin with `FileType PVL`.
+    #[error("the file does not begin with FileType PVL")]
+    FileType,
+    /// Another format version than 1.
+    #[error("format version is not 1")]
+    FormatVersion,
+    /// A line outside of any object or block.
+    #[error("a line that belongs to no object")]
+    Stray,
+    /// An object of an unknown kind, which is passed over.
+    #[error("unknown kind of object, Parameter or Curve expected")]
+    Object,
+    /// `StartObject` inside an object, or something that ends and had not begun.
+    #[error("begin and end do not match")]
+    Nesting,
+    /// A number that is none, or too large.
+    #[error("column {column}: a hex number of up to {digits} digits expected")]
+    Number {
+        /// Counted from 1.
+        column: usize,
+        /// For its width.
+        digits: usize,
+    },
+    /// A header field's number that is none.
+    #[error("a number expected")]
+    Field,
+    /// `TreeLayer` is missing or not 1…4.
+    #[error("TreeLayer 1 to 4 expected before StartData")]
+    Layer,
+    /// A field that the compatibility rules need.
+    #[error("{0} is missing before StartData")]
+    Missing(&'static str),
+    /// A UPID outside of the object's layer.
+    #[error("UPID {0} is not of this layer")]
+    OtherLayer(Upid),
+    /// A UPID for the second time.
+    #[error("UPID {0} occurs twice")]
+    Twice(Upid),
+    /// A curve ID for the second time.
+    #[error("curve {0} occurs twice")]
+    CurveTwice(u16),
+    /// The info block has too many or too few words.
+    #[error("info block of {0} words, 18 expected")]
+    InfoWords(usize),
+    /// The curve breaks a rule.
+    #[error("curve: {0}")]
+    Curve(CurveError),
+    /// `CurveID` and the info block differ.
+    #[error("CurveID is {said}, the info block says {found}")]
+    CurveId {
+        /// In the header.
+        said: u32,
+        /// In the info block.
+        found: u16,
+    },
+    /// `DataBlockByteSize` and the info block differ.
+    #[error("DataBlockByteSize is {said}, the info block says {found}")]
+    DataSize {
+        /// In the header.
+        said: u32,
+        /// By the info block.
+        found: u32,
+    },
+    /// Setpoints before or without an info block.
+    #[error("setpoints without an info block")]
+    NoInfo,
+    /// The file ends inside an object.
+    #[error("the file ends inside an object")]
+    Truncated,
+    /// There is neither a parameter object nor a curve.
+    #[error("the file has no parameter object and no curve")]
+    Empty,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Place {
+    Outside,
+    Parameters,
+    ParameterRows,
+    Curve,
+    CurveInfo,
+    CurveData,
+    Unknown,
+}
+
+/// Reads a file line by line.
+///
+/// Give it every line without its end, then call [`finish`](Self::finish). A file whose events
+/// include no problem of [`Severity::Error`] is complete and consistent; check that before anything
+/// goes to a drive.
+#[derive(Debug, Clone)]
+pub struct Parser {
+    line: usize,
+    place: Place,
+    began: bool,
+    objects: usize,
+    layer: Option<u32>,
+    identity: [Option<u32>; 3],
+    rows: usize,
+    columns: (usize, usize),
+    curve_id: Option<u32>,
+    data_size: Option<u32>,
+    info: [u32; INFO_WORDS],
+    info_words: usize,
+    curve: Option<InfoBlock>,
+    seen_curves: u128,
+    seen: [u64; 1024],
+}
+
+impl Default for Parser {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// Between the columns of a row, and between a keyword and its value.
+fn is_separator(character: char) -> bool {
+    matches!(character, ',' | ';' | '\t')
+}
+
+/// A hex number as files have it: with or without `h` or `0x`, of up to `digits` digits.
+fn hex(text: &str, digits: usize) -> Option<u32> {
+    let text = text.trim();
+    let text = text.strip_suffix(['h', 'H']).unwrap_or(text);
+    let text = text.strip_prefix("0x").or_else(|| text.strip_prefix("0X")).unwrap_or(text);
+    let plain = !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_hexdigit());
+    if !plain || text.trim_start_matches('0').len() > digits {
+        return None;
+    }
+    u32::from_str_radix(text, 16).ok()
+}
+
+/// A header field's number: decimal, or hex with its `h` or `0x`.
+fn number(text: &str) -> Option<u32> {
+    if text.ends_with(['h', 'H']) || text.starts_with("0x") { hex(text, 8) } else { text.parse().ok() }
+}
+
+impl Parser {
+    /// Nothing read.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            line: 0,
+            place: Place::Outside,
+            began: false,
+            objects: 0,
+            layer: None,
+            identity: [None; 3],
+            rows: 0,
+            columns: (1, 2),
+            curve_id: None,
+            data_size: None,
+            info: [0; INFO_WORDS],
+            info_words: 0,
+            curve: None,
+            seen_curves: 0,
+            seen: [0; 1024],
+        }
+    }
+
+    /// Lines read so far.
+    #[must_use]
+    pub const fn lines(&self) -> usize {
+        self.line
+    }
+
+    /// Takes the next line.
+    pub fn line(&mut self, text: &str, sink: &mut impl FnMut(Event)) {
+        self.line += 1;
+        let text = if self.line == 1 { text.trim_start_matches('\u{FEFF}') } else { text };
+        let text = text.trim();
+        if text.is_empty() {
+            return;
+        }
+        let bare = text.strip_prefix('@').unwrap_or(text);
+        let end =
+            bare.find(|c: char| is_separator(c) || c == ' ' || c == '=' || c == ':').unwrap_or(bare.len());
+        let (word, rest) = bare.split_at(end);
+        let value =
+            rest.trim_start_matches(|c: char| is_separator(c) || c == ' ' || c == '=' || c == ':').trim();
+        if !self.began {
+            self.began = true;
+            if !word.eq_ignore_ascii_case("FileType") || !value.eq_ignore_ascii_case("PVL") {
+                self.problem(sink, Severity::Error, Problem::FileType);
+            }
+        }
+        if !self.keyword(word, value, bare, sink) {
+            self.row(text, sink);
+        }
+    }
+
+    /// The file has ended.
+    pub fn finish(&mut self, sink: &mut impl FnMut(Event)) {
+        if self.place != Place::Outside {
+            self.problem(sink, Severity::Error, Problem::Truncated);
+        } else if self.objects == 0 {
+            self.problem(sink, Severity::Error, Problem::Empty);
+        }
+        self.place = Place::Outside;
+    }
+
+    fn problem(&self, sink: &mut impl FnMut(Event), severity: Severity, problem: Problem) {
+        sink(Event::Problem { line: self.line.max(1), severity, problem });
+    }
+
+    /// Returns whether the line was one.
+    fn keyword(&mut self, word: &str, value: &str, bare: &str, sink: &mut impl FnMut(Event)) -> bool {
+        let is = |name: &str| word.eq_ignore_ascii_case(name);
+        let wrong = Severity::Error;
+        if is("FileType")
+            || is("TreeFileName")
+            || is("Revision")
+            || is("CurveName")
+            || is("InfoBlockByteSize")
+        {
+        } else if is("FormatVersion") {
+            if number(value) != Some(1) {
+                self.problem(sink, Severity::Warning, Problem::FormatVersion);
+            }
+        } else if is("StartObject") {
+            if self.place != Place::Outside {
+                self.problem(sink, wrong, Problem::Nesting);
+            }
+            self.start_object(value, sink);
+        } else if is("EndObject") {
+            let inside = matches!(self.place, Place::ParameterRows | Place::CurveInfo | Place::CurveData);
+            if inside || self.place == Place::Outside {
+                self.problem(sink, wrong, Problem::Nesting);
+            }
+            if let Place::CurveInfo | Place::CurveData | Place::ParameterRows = self.place {
+                self.end_block(sink);
+            }
+            self.place = Place::Outside;
+        } else if is("StartData") {
+            match self.place {
+                Place::Parameters => self.start_rows(sink),
+                Place::Curve => {
+                    if self.curve.is_none() {
+                        self.problem(sink, wrong, Problem::NoInfo);
+                    }
+                    (self.place, self.rows, self.columns) = (Place::CurveData, 0, (1, 1));
+                }
+                Place::Unknown => {}
+                _ => self.problem(sink, wrong, Problem::Nesting),
+            }
+        } else if is("StartInfo") {
+            match self.place {
+                Place::Curve => (self.place, self.info_words, self.columns) = (Place::CurveInfo, 0, (1, 1)),
+                Place::Unknown => {}
+                _ => self.problem(sink, wrong, Problem::Nesting),
+            }
+        } else if is("EndData") || is("EndInfo") {
+            let matches = match self.place {
+                Place::ParameterRows | Place::CurveData => is("EndData"),
+                Place::CurveInfo => is("EndInfo"),
+                Place::Unknown => true,
+                _ => false,
+            };
+            if !matches {
+                self.problem(sink, wrong, Problem::Nesting);
+            }
+            self.end_block(sink);
+        } else if word.len() > 3
+            && word.get(..3).is_some_and(|col| col.eq_ignore_ascii_case("col"))
+            && word.get(3..).is_some_and(|n| n.parse::<usize>().is_ok())
+        {
+            self.column_names(bare);
+        } else {
+            let field = match self.place {
+                Place::Parameters if is("TreeLayer") => &mut self.layer,
+                Place::Parameters if is("TreeID") => &mut self.identity[0],
+                Place::Parameters if is("MainVersion") => &mut self.identity[1],
+                Place::Parameters if is("SubVersion") => &mut self.identity[2],
+                Place::Curve if is("CurveID") => &mut self.curve_id,
+                Place::Curve if is("DataBlockByteSize") => &mut self.data_size,
+                _ => return false,
+            };
+            *field = number(value);
+            if field.is_none() {
+                self.problem(sink, wrong, Problem::Field);
+            }
+        }
+        true
+    }
+
+    fn start_object(&mut self, kind: &str, sink: &mut impl FnMut(Event)) {
+        if kind.eq_ignore_ascii_case("Parameter") {
+            (self.place, self.layer, self.identity) = (Place::Parameters, None, [None; 3]);
+            self.objects += 1;
+        } else if kind.eq_ignore_ascii_case("Curve") {
+            (self.place, self.curve_id, self.data_size, self.curve) = (Place::Curve, None, None, None);
+            self.objects += 1;
+        } else {
+            self.place = Place::Unknown;
+            self.problem(sink, Severity::Warning, Problem::Object);
+        }
+    }
+
+    fn start_rows(&mut self, sink: &mut impl FnMut(Event)) {
+        (self.place, self.rows, self.columns) = (Place::ParameterRows, 0, (1, 2));
+        let layer = self.layer.and_then(Layer::from_number);
+        if layer.is_none() {
+            self.problem(sink, Severity::Error, Problem::Layer);
+        }
+        for (field, name) in self.identity.iter().zip(["TreeID", "MainVersion", "SubVersion"]) {
+            if field.is_none() {
+                self.problem(sink, Severity::Error, Problem::Missing(name));
+            }
+        }
+        let [tree_id, main_version, sub_version] = self.identity.map(Option::unwrap_or_default);
+        sink(Event::Section { layer, identity: TreeIdentity { tree_id, main_version, sub_version } });
+    }
+
+    fn end_block(&mut self, sink: &mut impl FnMut(Event)) {
+        match self.place {
+            Place::ParameterRows => {
+                sink(Event::EndSection { parameters: self.rows });
+                self.place = Place::Parameters;
+            }
+            Place::CurveInfo => {
+                self.place = Place::Curve;
+                self.end_info(sink);
+            }
+            Place::CurveData => {
+                if let Some(info) = self.curve {
+                    if usize::from(info.setpoints) != self.rows {
+                        let error = CurveError::Count { said: info.setpoints, found: self.rows };
+                        self.problem(sink, Severity::Error, Problem::Curve(error));
+                    }
+                    sink(Event::EndCurve { setpoints: self.rows });
+                }
+                self.place = Place::Curve;
+            }
+            _ => {}
+        }
+    }
+
+    fn end_info(&mut self, sink: &mut impl FnMut(Event)) {
+        if self.info_words != INFO_WORDS {
+            return self.problem(sink, Severity::Error, Problem::InfoWords(self.info_words));
+        }
+        let info = InfoBlock::parse(&self.info);
+        if let Err(error) = info.check() {
+            self.problem(sink, Severity::Error, Problem::Curve(error));
+        }
+        match self.curve_id {
+            Some(said) if said != u32::from(info.id) => {
+                self.problem(sink, Severity::Warning, Problem::CurveId { said, found: info.id });
+            }
+            _ => {}
+        }
+        match self.data_size {
+            Some(said) if said != info.data_size() => {
+                let found = info.data_size();
+                self.problem(sink, Severity::Warning, Problem::DataSize { said, found });
+            }
+            _ => {}
+        }
+        let bit = 1u128.checked_shl(info.id.into()).unwrap_or(0);
+        if self.seen_curves & bit != 0 {
+            self.problem(sink, Severity::Error, Problem::CurveTwice(info.id));
+        }
+        self.seen_curves |= bit;
+        self.curve = Some(info);
+        sink(Event::Curve(info));
+    }
+
+    /// `Col1 UPID @Col2 Value …`, on one line or several.
+    fn column_names(&mut self, bare: &str) {
+        let mut column = None;
+        for word in bare.split(|c: char| is_separator(c) || c == ' ' || c == '@' || c == '=') {
+            let digits = word.get(..3).filter(|col| col.eq_ignore_ascii_case("col")).and(word.get(3..));
+            if let Some(position) = digits.and_then(|digits| digits.parse().ok()) {
+                column = Some(position);
+            } else if let Some(position) = column {
+                if word.eq_ignore_ascii_case("UPID") {
+                    self.columns.0 = position;
+                } else if word.eq_ignore_ascii_case("Value") {
+                    self.columns.1 = position;
+                }
+            }
+        }
+    }
+
+    fn row(&mut self, text: &str, sink: &mut impl FnMut(Event)) {
+        match self.place {
+            Place::ParameterRows => self.parameter(text, sink),
+            Place::CurveInfo | Place::CurveData => {
+                let words = text.split(|c: char| is_separator(c) || c == ' ').filter(|word| !word.is_empty());
+                for (column, word) in (1..).zip(words) {
+                    match hex(word, 8) {
+                        Some(value) => self.curve_value(value, sink),
+                        None => {
+                            self.problem(sink, Severity::Error, Problem::Number { column, digits: 8 });
+                        }
+                    }
+                }
+            }
+            Place::Unknown => {}
+            Place::Outside | Place::Parameters | Place::Curve => {
+                self.problem(sink, Severity::Warning, Problem::Stray);
+            }
+        }
+    }
+
+    fn curve_value(&mut self, value: u32, sink: &mut impl FnMut(Event)) {
+        if self.place == Place::CurveInfo {
+            if let Some(word) = self.info.get_mut(self.info_words) {
+                *word = value;
+            }
+            self.info_words += 1;
+        } else {
+            self.rows += 1;
+            if self.curve.is_some() {
+                sink(Event::Setpoint(value as i32));
+            }
+        }
+    }
+
+    fn parameter(&mut self, text: &str, sink: &mut impl FnMut(Event)) {
+        // Blanks separate only where nothing else does: captions have them too.
+        let by_blanks = !text.contains(is_separator);
+        let column = |wanted: usize| {
+            let mut columns = (text.split(is_separator), text.split_whitespace());
+            let at = wanted.saturating_sub(1);
+            if by_blanks { columns.1.nth(at) } else { columns.0.nth(at) }
+        };
+        let (upid_column, value_column) = self.columns;
+        let upid = column(upid_column).and_then(|text| hex(text, 4));
+        let value = column(value_column).and_then(|text| hex(text, 8));
+        let upid = upid.and_then(|upid| u16::try_from(upid).ok()).map(Upid);
+        let (Some(upid), Some(value)) = (upid, value) else {
+            let (column, digits) = if upid.is_none() { (upid_column, 4) } else { (value_column, 8) };
+            return self.problem(sink, Severity::Error, Problem::Number { column, digits });
+        };
+        let layer = self.layer.and_then(Layer::from_number);
+        if layer.is_some() && upid.layer() != layer {
+            self.problem(sink, Severity::Warning, Problem::OtherLayer(upid));
+        }
+        let bit = 1 << (upid.0 % 64);
+        if let Some(word) = self.seen.get_mut(usize::from(upid.0 / 64)) {
+            let twice = *word & bit != 0;
+            *word |= bit;
+            if twice {
+                self.problem(sink, Severity::Error, Problem::Twice(upid));
+            }
+        }
+        self.rows += 1;
+        sink(Event::Parameter { upid, value });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::{
+        string::{String, ToString},
+        vec::Vec,
+    };
+
+    fn read(text: &str) -> Vec<Event> {
+        let (mut parser, mut events) = (Parser::new(), Vec::new());
+        text.lines().for_each(|line| parser.line(line, &mut |event| events.push(event)));
+        parser.finish(&mut |event| events.push(event));
+        events
+    }
+
+    fn problems(text: &str) -> Vec<(usize, Severity, String)> {
+        let problem = |event| match event {
+            Event::Problem { line, severity, problem } => Some((line, severity, problem.to_string())),
+            _ => None,
+        };
+        read(text).into_iter().filter_map(problem).collect()
+    }
+
+    /// Manual B, figures 12 and 13.
+    const FILE: &str = "@FileType PVL
+@FormatVersion 1
+@StartObject Parameter
+@TreeFileName OSTree1100DP_V3S0_b1
+@TreeLayer 1
+@TreeID 1
+@MainVersion 3
+@SubVersion 0
+@Revision b1
+@StartData
+@Col1 UPID @Col2 Value @Col3 Caption @Col4 ScaledValue Unit
+03E9h, 6F43794Dh, OS\\Drive Name 1, MyCo
+03EAh, 6F72746Eh, OS\\Drive Name 2, ntro
+@EndData
+@EndObject
+@StartObject Curve
+@CurveName Example Curve
+@CurveID 23
+@InfoBlockByteSize 72
+@DataBlockByteSize 40
+@StartInfo
+@Col1 Value
+00030046h
+0004000Ah
+6D617845h 5F656C70h 76727543h 00000065h
+00000000h
+00170000h 00004E20h 0005001Ah 42400000h 0000000Fh
+00000000h 00000000h 00000000h 00000000h 00000000h 00000000h
+@EndInfo
+@StartData
+@Col1 Value
+00000000h
+000075CAh
+0001C8F2h 0003D090h 00064DF8h 0008F448h 000B71B0h 000D794Eh 000ECC76h 000F4240h
+@EndData
+@EndObject
+";
+
+    #[test]
+    fn the_manuals_figures() {
+        let events = read(FILE);
+        let identity = TreeIdentity { tree_id: 1, main_version: 3, sub_version: 0 };
+        assert_eq!(events[0], Event::Section { layer: Some(Layer::Os), identity });
+        assert_eq!(events[1], Event::Parameter { upid: Upid(0x3E9), value: 0x6F43_794D });
+        assert_eq!(events[3], Event::EndSection { parameters: 2 });
+        let Event::Curve(info) = &events[4] else { panic!("{events:?}") };
+        assert_eq!(
+            (info.name(), info.id, info.setpoints, info.x_length),
+            (&b"Example_Curve"[..], 23, 10, 20_000)
+        );
+        assert_eq!(events[5..7], [Event::Setpoint(0), Event::Setpoint(0x75CA)]);
+        assert_eq!(events[15..], [Event::EndCurve { setpoints: 10 }]);
+    }
+
+    #[test]
+    fn every_spelling_reads_the_same() {
+        let expected = read(FILE);
+        assert_eq!(read(&FILE.replace('@', "")), expected);
+        assert_eq!(read(&FILE.replace("h,", ",").replace("h\n", "\n").replace("h ", " ")), expected);
+        assert_eq!(read(&FILE.replace(", ", ";")), expected);
+        assert_eq!(read(&FILE.replace(", ", "\t")), expected);
+        assert_eq!(read(&FILE.replace(", ", " ")), expected);
+        assert_eq!(read(&FILE.replace('\n', "\r\n")), expected);
+        assert_eq!(read(&FILE.to_uppercase()), expected);
+        assert_eq!(read(&std::format!("\u{FEFF}{FILE}")), expected);
+        let swapped = FILE
+            .replace("@Col1 UPID @Col2 Value", "@Col2 UPID\n@Col1 Value")
+            .replace("03E9h, 6F43794Dh", "6F43794Dh, 03E9h")
+            .replace("03EAh, 6F72746Eh", "6F72746Eh, 03EAh");
+        assert_eq!(read(&swapped), expected);
+    }
+
+    #[test]
+    fn problems_name_their_line() {
+        let wrong = Severity::Error;
+        let with = |from: &str, to: &str| {
+            assert!(FILE.contains(from));
+            problems(&FILE.replacen(from, to, 1))
+        };
+        assert_eq!(problems(FILE), []);
+        let column = |n, digits| std::format!("column {n}: a hex number of up to {digits} digits expected");
+        assert_eq!(with("03E9h", "103E9h"), [(12, wrong, column(1, 4))]);
+        assert_eq!(with("6F43794D", "XF43794D"), [(12, wrong, column(2, 8))]);
+        assert_eq!(with("03EAh", "03E9h"), [(13, wrong, "UPID 03E9h occurs twice".into())]);
+        assert_eq!(
+            with("03EAh", "13EAh"),
+            [(13, Severity::Warning, "UPID 13EAh is not of this layer".into())]
+        );
+        assert_eq!(with("@TreeID 1\n", "\n"), [(10, wrong, "TreeID is missing before StartData".into())]);
+        assert_eq!(with("@TreeLayer 1", "@TreeLayer 5")[0].2, "TreeLayer 1 to 4 expected before StartData");
+        assert_eq!(with("@MainVersion 3", "@MainVersion x")[0], (7, wrong, "a number expected".into()));
+        let count = "curve: the info block says 10 setpoints, 9 are there";
+        assert_eq!(with("000075CAh\n", "\n"), [(35, wrong, count.into())]);
+        assert_eq!(with("0004000Ah", "")[0].2, "info block of 17 words, 18 expected");
+        assert_eq!(with("00170000h", "00770000h")[0].2, "curve: curve ID 119, 1 to 100 expected");
+        assert_eq!(with("@CurveID 23", "@CurveID 24")[0].1, Severity::Warning);
+        assert_eq!(
+            with("@FileType PVL", "")[0],
+            (2, wrong, "the file does not begin with FileType PVL".into())
+        );
+        assert_eq!(with("@EndData", "").len(), 1);
+        assert_eq!(
+            with("Parameter", "Oscilloscope"),
+            [(3, Severity::Warning, "unknown kind of object, Parameter or Curve expected".into())]
+        );
+        let cut = &FILE[..FILE.find("000ECC76h").unwrap()];
+        assert_eq!(problems(cut), [(34, wrong, "the file ends inside an object".into())]);
+        assert_eq!(problems("FileType PVL")[0].2, "the file has no parameter object and no curve");
+    }
+
+    proptest! {
+        #[test]
+        fn any_text_is_survived(lines in proptest::collection::vec("[@a-zA-Z0-9h,; \t]{0,30}", 0..40)) {
+            read(&lines.join("\n"));
+        }
+    }
+}
