@@ -4,5 +4,6 @@
 pub mod can;
 pub mod canopen;
 pub mod conversation;
+pub mod linmot;
 pub mod plant;
 pub mod serial;
