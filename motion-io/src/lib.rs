@@ -9,6 +9,7 @@ pub mod capture;
 pub mod codec;
 pub mod endpoint;
 pub mod lb2;
+pub mod linmot;
 pub mod port;
 #[cfg(all(feature = "pty", unix))]
 mod pty;
