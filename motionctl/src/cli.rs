@@ -81,6 +81,11 @@ pub(crate) enum Command {
         #[command(subcommand)]
         command: crate::eds::cli::Eds,
     },
+    /// LinMot drives: parameters, curves, command table, error log, PVL files
+    Linmot {
+        #[command(subcommand)]
+        command: crate::linmot::cli::Linmot,
+    },
     /// Completions for a shell
     Completions { shell: clap_complete::Shell },
     /// The manual page
@@ -104,6 +109,8 @@ pub(crate) enum Sim {
         #[arg(long, value_name = "N")]
         device: Option<u8>,
     },
+    /// A virtual LinMot drive behind CANopen or LinRS
+    Linmot(crate::linmot::cli::SimLinmot),
 }
 
 #[derive(Debug, Clone, Args)]

@@ -15,6 +15,7 @@ mod eds;
 mod exit;
 mod image;
 mod lb2;
+mod linmot;
 mod output;
 mod params;
 mod run;
@@ -36,6 +37,7 @@ fn main() -> ExitCode {
         Command::Bus(arguments) => can::bus::run(&out, &arguments),
         Command::Ports => ports(&out),
         Command::Lb2 { command } => lb2::run(&out, &cli.global, &command),
+        Command::Linmot { command } => linmot::run(&out, &cli.global, &command),
         Command::Params { command } => params::run(&out, &cli.global, &command),
         Command::Decode(args) => decode::run(&out, &args),
         Command::Eds { command } => eds::run(&out, cli.global.dry_run, &command),

@@ -84,6 +84,11 @@ impl Output {
         bar
     }
 
+    /// Asks on a terminal; without one, nothing is asked.
+    pub(crate) fn confirm_on_terminal(&self, yes: bool, question: &str) -> Result<(), Exit> {
+        self.confirm(yes || !std::io::stdin().is_terminal(), question)
+    }
+
     /// Asks on a terminal; without one, `--yes` must have been given.
     pub(crate) fn confirm(&self, yes: bool, question: &str) -> Result<(), Exit> {
         if yes {

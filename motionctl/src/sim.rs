@@ -19,7 +19,10 @@ use crate::output::Output;
 use crate::storage::FileStorage;
 
 pub(crate) fn run(out: &Output, command: &Sim) -> Result<(), Exit> {
-    let Sim::Controller { model, serial, state, device } = command;
+    let (model, serial, state, device) = match command {
+        Sim::Controller { model, serial, state, device } => (model, serial, state, device),
+        Sim::Linmot(arguments) => return crate::linmot::sim::run(out, arguments),
+    };
     let model = Model::from_number(*model)
         .ok_or_else(|| Exit::usage(format!("--model {model}: 8230, 8231, 8235 or 8236 expected")))?;
     let endpoint: Endpoint =

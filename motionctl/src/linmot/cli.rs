@@ -1,0 +1,339 @@
+//! The command line of `linmot` and `sim linmot`.
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand, ValueEnum};
+use linmot::upid::Upid;
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct Drive {
+    /// CAN endpoint: socketcan:can0, slcan:/dev/ttyACM0?bitrate=500000, socketcand:HOST:PORT/can0
+    #[arg(long, value_name = "EP", conflicts_with = "port")]
+    pub(crate) can: Option<String>,
+    /// Serial endpoint, for LinRS: /dev/ttyUSB0, serial:PATH?baud=…&parity=…, tcp:HOST:PORT, or a name of the configuration
+    #[arg(long, value_name = "EP")]
+    pub(crate) port: Option<String>,
+    /// CANopen node ID, or LinRS ID
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(crate) node: u8,
+    /// How CAN carries the commands: default SDO, or the configuration module in RPDO 4 and TPDO 4
+    #[arg(long, value_enum, default_value_t = Carrier::Sdo)]
+    pub(crate) carrier: Carrier,
+    /// Checksum of LinRS frames, as the drive's UPID 2080h says
+    #[arg(long, value_enum, default_value_t = SumKind::None)]
+    pub(crate) checksum: SumKind,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Carrier {
+    Sdo,
+    Pdo,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum SumKind {
+    None,
+    #[value(name = "sum")]
+    Bytes,
+    Crc,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum LayerName {
+    Os,
+    Mc,
+    Interface,
+    Application,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Linmot {
+    /// Parameters by UPID
+    Params {
+        #[command(subcommand)]
+        command: Params,
+    },
+    /// Curves
+    Curve {
+        #[command(subcommand)]
+        command: Curve,
+    },
+    /// The command table
+    Table {
+        #[command(subcommand)]
+        command: Table,
+    },
+    /// The error log
+    Errors {
+        #[command(flatten)]
+        drive: Drive,
+    },
+    /// Parameters and curves to and from PVL files
+    Pvl {
+        #[command(subcommand)]
+        command: Pvl,
+    },
+    /// Restart the drive: ROM values and flash become RAM values
+    Restart {
+        #[command(flatten)]
+        drive: Drive,
+        /// Until it answers again
+        #[arg(long)]
+        wait: bool,
+    },
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Params {
+    /// All parameters
+    List {
+        #[command(flatten)]
+        drive: Drive,
+        /// Only those whose ROM value is not the default
+        #[arg(long)]
+        changed: bool,
+    },
+    /// One parameter; a string by its own UPID
+    Get {
+        #[command(flatten)]
+        drive: Drive,
+        /// Hex as 13A2h, 0x13A2 or 13A2; digits only are decimal
+        #[arg(value_parser = upid)]
+        upid: Upid,
+        #[command(flatten)]
+        memory: Memory,
+    },
+    /// Write one parameter; without --ram, --rom or --both: both of a live one, ROM of others
+    Set {
+        #[command(flatten)]
+        drive: Drive,
+        /// Hex as 13A2h, 0x13A2 or 13A2; digits only are decimal
+        #[arg(value_parser = upid)]
+        upid: Upid,
+        #[command(flatten)]
+        memory: Memory,
+        /// Raw value, decimal or hex (0x10, 10h); of a string its text
+        #[arg(allow_hyphen_values = true)]
+        value: String,
+    },
+    /// ROM values of one layer to their defaults; they act after a restart
+    Defaults {
+        #[command(flatten)]
+        drive: Drive,
+        /// One or more layers
+        #[arg(long, value_enum, required = true, num_args = 1..)]
+        layer: Vec<LayerName>,
+    },
+}
+
+#[derive(Debug, Clone, Copy, Args)]
+#[group(multiple = false)]
+pub(crate) struct Memory {
+    /// The value that the firmware runs on
+    #[arg(long)]
+    pub(crate) ram: bool,
+    /// The non-volatile value
+    #[arg(long)]
+    pub(crate) rom: bool,
+    /// Both
+    #[arg(long)]
+    pub(crate) both: bool,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Curve {
+    /// Curves in the drive's RAM
+    List {
+        #[command(flatten)]
+        drive: Drive,
+    },
+    /// One curve into a file
+    Get {
+        #[command(flatten)]
+        drive: Drive,
+        id: u16,
+        /// CSV with all that the drive knows of the curve
+        #[arg(long, short, value_name = "F")]
+        output: PathBuf,
+    },
+    /// A file into a new curve
+    Add {
+        #[command(flatten)]
+        drive: Drive,
+        id: u16,
+        /// What `get` wrote, or CSV: `# name=… length_ms=… unit=0.1um`, then one setpoint a line
+        file: PathBuf,
+    },
+    /// A file into a curve that exists, with the same number of setpoints
+    Modify {
+        #[command(flatten)]
+        drive: Drive,
+        id: u16,
+        file: PathBuf,
+    },
+    /// RAM to flash; the MC software is stopped meanwhile
+    Save {
+        #[command(flatten)]
+        drive: Drive,
+    },
+    /// All curves in RAM
+    DeleteAll {
+        #[command(flatten)]
+        drive: Drive,
+    },
+    /// One curve as a picture
+    Plot {
+        #[command(flatten)]
+        drive: Drive,
+        id: u16,
+        #[arg(long, short, value_name = "F.svg")]
+        output: PathBuf,
+    },
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Table {
+    /// All entries
+    List {
+        #[command(flatten)]
+        drive: Drive,
+    },
+    /// One entry
+    Get {
+        #[command(flatten)]
+        drive: Drive,
+        #[arg(value_parser = clap::value_parser!(u16).range(1..=255))]
+        entry: u16,
+    },
+    /// Write one entry
+    Set {
+        #[command(flatten)]
+        drive: Drive,
+        #[arg(value_parser = clap::value_parser!(u16).range(1..=255))]
+        entry: u16,
+        /// 64 bytes in hex
+        #[arg(long, value_name = "HEX")]
+        raw: String,
+    },
+    /// Delete one entry
+    Delete {
+        #[command(flatten)]
+        drive: Drive,
+        #[arg(value_parser = clap::value_parser!(u16).range(1..=255))]
+        entry: u16,
+    },
+    /// Delete all entries in RAM
+    DeleteAll {
+        #[command(flatten)]
+        drive: Drive,
+    },
+    /// RAM to flash; the MC software is stopped meanwhile
+    Save {
+        #[command(flatten)]
+        drive: Drive,
+    },
+    /// Links that lead nowhere, loops
+    Check {
+        #[command(flatten)]
+        drive: Drive,
+    },
+    /// All entries into a TOML file
+    Backup {
+        #[command(flatten)]
+        drive: Drive,
+        file: PathBuf,
+    },
+    /// A TOML file into the drive, RAM and flash; entries that it does not name are deleted
+    Restore {
+        #[command(flatten)]
+        drive: Drive,
+        file: PathBuf,
+    },
+    /// A TOML file with the drive's entries
+    Compare {
+        #[command(flatten)]
+        drive: Drive,
+        file: PathBuf,
+    },
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum EncodingName {
+    /// Windows-1252, as the manufacturer's tool writes
+    Windows1252,
+    Utf8,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Pvl {
+    /// ROM values and curves into a file
+    Backup {
+        #[command(flatten)]
+        drive: Drive,
+        file: PathBuf,
+        /// Only parameters that are not at their default
+        #[arg(long)]
+        changed: bool,
+        #[arg(long, value_enum, default_value_t = EncodingName::Windows1252)]
+        encoding: EncodingName,
+    },
+    /// A file into ROM values and curves, RAM and flash
+    Restore {
+        #[command(flatten)]
+        drive: Drive,
+        file: PathBuf,
+        /// Delete all curves of the drive first
+        #[arg(long)]
+        replace_curves: bool,
+    },
+    /// A file with the drive
+    Compare {
+        #[command(flatten)]
+        drive: Drive,
+        file: PathBuf,
+    },
+    /// A file by itself
+    Check { file: PathBuf },
+}
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct SimLinmot {
+    /// CAN endpoint to be a node on
+    #[arg(long, value_name = "EP", required_unless_present = "serial")]
+    pub(crate) can: Option<String>,
+    /// Serial endpoint to answer LinRS on: pty:LINK, tcp:HOST:PORT or a serial port
+    #[arg(long, value_name = "EP", alias = "port", conflicts_with = "can")]
+    pub(crate) serial: Option<String>,
+    /// CANopen node ID, or LinRS ID
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(crate) node: u8,
+    /// File for ROM values and flash; absent: in memory
+    #[arg(long, value_name = "FILE")]
+    pub(crate) state: Option<PathBuf>,
+    /// Writable parameters that the drive has at least
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(crate) parameters: usize,
+    /// Checksum of LinRS frames
+    #[arg(long, value_enum, default_value_t = SumKind::None)]
+    pub(crate) checksum: SumKind,
+}
+
+/// Hex with `h`, `0x` or a letter among its digits, decimal otherwise.
+pub(crate) fn number(text: &str) -> Option<u32> {
+    let hex =
+        text.strip_prefix("0x").or_else(|| text.strip_prefix("0X")).or_else(|| text.strip_suffix(['h', 'H']));
+    match hex {
+        Some(hex) => u32::from_str_radix(hex, 16).ok(),
+        None if text.starts_with(['-', '+']) => text.parse::<i32>().ok().map(|value| value as u32),
+        None => text.parse().ok(),
+    }
+}
+
+fn upid(text: &str) -> Result<Upid, String> {
+    let hex = || u32::from_str_radix(text, 16).ok().filter(|_| text.len() <= 4);
+    number(text)
+        .or_else(hex)
+        .and_then(|value| u16::try_from(value).ok())
+        .map(Upid)
+        .ok_or_else(|| "a UPID expected: 13A2h, 0x13A2, or decimal up to 65535".into())
+}

@@ -1,0 +1,127 @@
+//! From the command line to a link, and from a link's errors to exit codes.
+
+use core::time::Duration;
+
+use linmot::code::Status;
+use linmot::link::{Fault, Link};
+use linmot::linrs::{Checksum, Config};
+use linmot::request::{Reply, Request};
+use motion_io::linmot::transfer::TransferError;
+use motion_io::linmot::{LinRsLink, LinkError, PdoLink, SdoLink};
+use motion_io::port::{Role, open};
+use pdo::NodeId;
+
+use super::cli::{Carrier, Drive, SumKind};
+use crate::cli::{Global, Line};
+use crate::exit::Exit;
+
+/// Reads are repeated so often.
+const RETRIES: u8 = 2;
+
+/// Any carrier.
+pub(crate) struct AnyLink(Box<dyn Link<Error = LinkError>>);
+
+impl Link for AnyLink {
+    type Error = LinkError;
+
+    fn call(&mut self, request: &Request) -> Result<Reply, LinkError> {
+        self.0.call(request)
+    }
+}
+
+pub(super) fn checksum(sum: SumKind) -> Checksum {
+    match sum {
+        SumKind::None => Checksum::None,
+        SumKind::Bytes => Checksum::Sum,
+        SumKind::Crc => Checksum::Crc,
+    }
+}
+
+pub(super) fn connect(global: &Global, drive: &Drive) -> Result<AnyLink, Exit> {
+    let timeout = global
+        .timeout
+        .map(|seconds| {
+            Duration::try_from_secs_f64(seconds)
+                .ok()
+                .filter(|timeout| !timeout.is_zero())
+                .ok_or_else(|| Exit::usage(format!("--timeout {seconds}: seconds above 0 expected")))
+        })
+        .transpose()?;
+    let Some(can) = &drive.can else {
+        let line = Line { port: drive.port.clone(), device: None };
+        let endpoint = crate::connect::endpoint(global, &line)?;
+        let mut config = Config::new(drive.node);
+        config.checksum = checksum(drive.checksum);
+        config.answer = timeout.unwrap_or(config.answer);
+        let port = open(&endpoint, Role::Master).map_err(|error| Exit::trouble(error.to_string()))?;
+        return Ok(AnyLink(Box::new(LinRsLink::new(port, config, RETRIES))));
+    };
+    let node = NodeId::new(drive.node).map_err(|error| Exit::usage(format!("--node: {error}")))?;
+    let endpoint =
+        can.parse().map_err(|error: motion_io::endpoint::EndpointError| Exit::usage(error.to_string()))?;
+    let port = motion_io::can::open(&endpoint).map_err(|error| Exit::trouble(error.to_string()))?;
+    Ok(AnyLink(match drive.carrier {
+        Carrier::Sdo => Box::new(SdoLink::new(port, node, timeout, RETRIES)),
+        Carrier::Pdo => {
+            let mut config = linmot::client::Config::default();
+            config.echo = timeout.unwrap_or(config.echo);
+            Box::new(PdoLink::new(port, node, linmot::client::Client::new(config)))
+        }
+    }))
+}
+
+impl From<LinkError> for Exit {
+    fn from(error: LinkError) -> Self {
+        let status = match error {
+            LinkError::NoAnswer { .. } | LinkError::StillBusy { .. } => 3,
+            LinkError::WrongEcho { .. } | LinkError::Restarted { .. } | LinkError::Aborted { .. } => 4,
+            LinkError::NotCarried(_) => 2,
+            _ => 5,
+        };
+        Self { status, message: error.to_string() }
+    }
+}
+
+impl From<Fault<LinkError>> for Exit {
+    fn from(fault: Fault<LinkError>) -> Self {
+        match fault {
+            Fault::Carrier(error) => error.into(),
+            Fault::Refused { request, reply } => {
+                let words = hint(&request, reply.status);
+                Self::refused(format!("{}{words}", Fault::<LinkError>::Refused { request, reply }))
+            }
+            other => Self::refused(other.to_string()),
+        }
+    }
+}
+
+impl From<TransferError<LinkError>> for Exit {
+    fn from(error: TransferError<LinkError>) -> Self {
+        match error {
+            TransferError::Drive(fault) => fault.into(),
+            TransferError::File(error) => Self::trouble(error.to_string()),
+            other => Self::check(other.to_string()),
+        }
+    }
+}
+
+/// What a status means for this command, where its text leaves it open.
+fn hint(request: &Request, status: Status) -> &'static str {
+    match (status, request) {
+        (Status::UPID, _) => ": the drive has no such parameter",
+        (Status::USAGE, Request::Write { memory: linmot::request::Memory::Ram, .. }) => {
+            ": read-only, or not live, so that only its ROM value can be written"
+        }
+        (Status::USAGE, Request::Write { .. }) => ": read-only, or its RAM value cannot be written",
+        (Status::RANGE, Request::Write { .. }) => ": below the minimum or above the maximum",
+        (Status::TYPE, _) => ": a string, read and written by its stringlets",
+        (Status::DEFINED, Request::StartCurve { access: linmot::request::Access::Add, .. }) => {
+            ": a curve with this ID exists"
+        }
+        (Status::DEFINED, Request::StartCurve { .. }) => ": no such curve",
+        (Status::DEFINED, _) => ": no such entry",
+        (Status::ODD_ADDRESS, _) => ": the block was finished already",
+        (Status::NOT_STOPPED, _) => ": stop it first",
+        _ => "",
+    }
+}

@@ -1,0 +1,235 @@
+//! `motionctl linmot pvl`.
+
+use std::fs::File;
+use std::io::{BufReader, BufWriter, Write};
+use std::path::Path;
+
+use linmot::pvl::{Encoding, Severity};
+use motion_io::linmot::LinkError;
+use motion_io::linmot::transfer::{self, Difference, Options, Progress, Summary, TransferError};
+use serde_json::{Value, json};
+
+use super::cli::{Drive, EncodingName, Pvl};
+use super::connect::connect;
+use super::curve;
+use crate::cli::Global;
+use crate::exit::Exit;
+use crate::output::Output;
+
+pub(super) fn run(out: &Output, global: &Global, command: &Pvl) -> Result<(), Exit> {
+    match command {
+        Pvl::Backup { drive, file, changed, encoding } => {
+            let encoding = match encoding {
+                EncodingName::Windows1252 => Encoding::Windows1252,
+                EncodingName::Utf8 => Encoding::Utf8,
+            };
+            backup(out, global, drive, file, *changed, encoding)
+        }
+        Pvl::Restore { drive, file, replace_curves } => restore(out, global, drive, file, *replace_curves),
+        Pvl::Compare { drive, file } => compare(out, global, drive, file),
+        Pvl::Check { file } => check(out, file),
+    }
+}
+
+fn open(path: &Path) -> Result<BufReader<File>, Exit> {
+    File::open(path).map(BufReader::new).map_err(|error| Exit::file(&path.display().to_string(), &error))
+}
+
+fn failed(path: &Path, error: TransferError<LinkError>) -> Exit {
+    let of_file = matches!(error, TransferError::File(_) | TransferError::Check { .. });
+    let exit = Exit::from(error);
+    if of_file { exit.context(&path.display().to_string()) } else { exit }
+}
+
+fn backup(
+    out: &Output,
+    global: &Global,
+    drive: &Drive,
+    path: &Path,
+    changed: bool,
+    encoding: Encoding,
+) -> Result<(), Exit> {
+    let name = path.display().to_string();
+    if global.dry_run {
+        out.say(&format!("would write ROM values and curves to {name}"));
+        return Ok(());
+    }
+    let mut link = connect(global, drive)?;
+    // A backup that was not completed must not look like one: it gets its name at the end.
+    let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut file = tempfile::NamedTempFile::new_in(directory).map_err(|error| Exit::file(&name, &error))?;
+    let bar = out.progress("reading", 0);
+    let mut writer = BufWriter::new(file.as_file_mut());
+    let done = transfer::backup(&mut link, &mut writer, encoding, changed, |progress| {
+        bar.set_position((progress.parameters + progress.setpoints) as u64);
+    })
+    .map_err(|error| failed(path, error))?;
+    writer.flush().map_err(|error| Exit::file(&name, &error))?;
+    drop(writer);
+    bar.finish_and_clear();
+    file.as_file().sync_all().map_err(|error| Exit::file(&name, &error))?;
+    file.persist(path).map_err(|error| Exit::file(&name, &error))?;
+    let Progress { parameters, curves, setpoints, .. } = done;
+    let json = json!({ "file": name, "parameters": parameters, "curves": curves, "setpoints": setpoints });
+    out.document(json, || {
+        println!("{parameters} parameters and {curves} curves with {setpoints} setpoints written to {name}");
+    });
+    Ok(())
+}
+
+fn restore(
+    out: &Output,
+    global: &Global,
+    drive: &Drive,
+    path: &Path,
+    delete_curves: bool,
+) -> Result<(), Exit> {
+    let mut file = open(path)?;
+    let options = Options { delete_curves, dry_run: global.dry_run };
+    if !global.dry_run {
+        out.confirm(global.yes, "Stop the MC software and write parameters and curves to ROM and flash?")?;
+    }
+    // What the file alone can tell is told before a drive is needed.
+    Summary::of(&mut file)
+        .map_err(TransferError::File)
+        .and_then(|summary| summary.check())
+        .map_err(|error| failed(path, error))?;
+    std::io::Seek::rewind(&mut file).map_err(|error| Exit::file(&path.display().to_string(), &error))?;
+    let mut link = connect(global, drive)?;
+    let bar = out.progress("restoring", 0);
+    let mut last = Progress::default();
+    let done = transfer::restore(&mut link, &mut file, options, |progress| {
+        last = progress;
+        bar.set_position((progress.parameters + progress.setpoints) as u64);
+    });
+    bar.finish_and_clear();
+    let done = done.map_err(|error| {
+        let before = matches!(
+            error,
+            TransferError::Check { .. } | TransferError::Incompatible(_) | TransferError::Parameters(_)
+        );
+        let exit = failed(path, error);
+        if before {
+            return exit.context("nothing was written");
+        }
+        let Progress { parameters, written, curves, .. } = last;
+        exit.context(&format!(
+            "incomplete: {parameters} parameters ({written} of them written) and {curves} curves are as in the file, \
+             curves in RAM only, the MC software may be stopped; the same restore completes it"
+        ))
+    })?;
+    let Progress { parameters, written, curves, setpoints } = done;
+    let json = json!({
+        "dry_run": global.dry_run, "parameters": parameters, "written": written,
+        "curves": curves, "setpoints": setpoints, "saved": !global.dry_run,
+    });
+    out.document(json, || {
+        let would = if global.dry_run { "would be " } else { "" };
+        println!("{parameters} parameters, {written} of them {would}written; {curves} curves {would}written and saved");
+    });
+    Ok(())
+}
+
+fn compare(out: &Output, global: &Global, drive: &Drive, path: &Path) -> Result<(), Exit> {
+    let mut file = open(path)?;
+    let mut link = connect(global, drive)?;
+    let mut differences = Vec::new();
+    let bar = out.progress("comparing", 0);
+    let done = transfer::compare(
+        &mut link,
+        &mut file,
+        |difference| differences.push(difference),
+        |progress| bar.set_position((progress.parameters + progress.setpoints) as u64),
+    )
+    .map_err(|error| failed(path, error))?;
+    bar.finish_and_clear();
+    let (json, lines): (Vec<Value>, Vec<String>) = differences.iter().map(describe).unzip();
+    let equal = differences.is_empty();
+    let Progress { parameters, curves, .. } = done;
+    let document = json!({
+        "equal": equal, "equal_parameters": parameters, "equal_curves": curves, "different": json,
+    });
+    out.document(document, || {
+        lines.iter().for_each(|line| println!("{line}"));
+        println!("{parameters} parameters and {curves} curves are equal");
+    });
+    if equal { Ok(()) } else { Err(Exit::check(format!("{} differences", differences.len()))) }
+}
+
+fn describe(difference: &Difference) -> (Value, String) {
+    match *difference {
+        Difference::Parameter { upid, file, drive } => (
+            json!({ "upid": upid.0, "file": file, "drive": drive }),
+            format!("{upid}: {file:08X}h in the file, {drive:08X}h in the drive"),
+        ),
+        Difference::Missing(upid) => {
+            (json!({ "upid": upid.0, "drive": null }), format!("{upid}: unknown to the drive"))
+        }
+        Difference::MissingCurve(id) => {
+            (json!({ "curve": id, "what": "missing" }), format!("curve {id} is not in the drive"))
+        }
+        Difference::ExtraCurve(id) => {
+            (json!({ "curve": id, "what": "extra" }), format!("curve {id} is not in the file"))
+        }
+        Difference::CurveInfo(id) => {
+            (json!({ "curve": id, "what": "info" }), format!("curve {id}: the info blocks differ"))
+        }
+        Difference::CurveData { id, first, count } => (
+            json!({ "curve": id, "what": "setpoints", "first": first, "count": count }),
+            format!("curve {id}: {count} setpoints differ, the first is number {first}"),
+        ),
+        _ => (Value::Null, String::new()),
+    }
+}
+
+fn check(out: &Output, path: &Path) -> Result<(), Exit> {
+    let summary =
+        Summary::of(&mut open(path)?).map_err(|error| Exit::file(&path.display().to_string(), &error))?;
+    let objects: Vec<Value> = summary
+        .sections
+        .iter()
+        .map(|(layer, identity, parameters)| {
+            json!({
+                "layer": layer.map(linmot::upid::Layer::number),
+                "name": layer.map(linmot::upid::Layer::name),
+                "tree_id": identity.tree_id,
+                "main_version": identity.main_version,
+                "sub_version": identity.sub_version,
+                "parameters": parameters,
+            })
+        })
+        .collect();
+    let curves: Vec<Value> = summary.curves.iter().map(curve::to_json).collect();
+    let word = |severity: Severity| if severity == Severity::Error { "error" } else { "warning" };
+    let diagnostics: Vec<Value> = summary
+        .diagnostics
+        .iter()
+        .map(|(line, severity, problem)| {
+            json!({ "line": line, "severity": word(*severity), "message": problem.to_string() })
+        })
+        .collect();
+    let document = json!({
+        "objects": objects, "curves": curves, "diagnostics": diagnostics,
+        "more_diagnostics": summary.more_diagnostics,
+    });
+    out.document(document, || {
+        for (line, severity, problem) in &summary.diagnostics {
+            println!("{}:{line}: {}: {problem}", path.display(), word(*severity));
+        }
+        if summary.more_diagnostics > 0 {
+            println!("{} more", summary.more_diagnostics);
+        }
+        for (layer, identity, parameters) in &summary.sections {
+            let name = layer.map_or("unknown layer", linmot::upid::Layer::name);
+            println!(
+                "{name}: {parameters} parameters, tree {} version {}.{}",
+                identity.tree_id, identity.main_version, identity.sub_version
+            );
+        }
+        println!("{} curves, {} errors", summary.curves.len(), summary.errors());
+    });
+    match summary.errors() {
+        0 => Ok(()),
+        errors => Err(Exit::check(format!("{}: {errors} errors", path.display()))),
+    }
+}

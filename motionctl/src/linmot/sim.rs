@@ -1,0 +1,103 @@
+//! `motionctl sim linmot`: a virtual drive on an endpoint.
+
+use core::sync::atomic::Ordering;
+use core::time::Duration;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use device_sim::linmot::{CanDrive, Times, VirtualDrive, generated};
+use linmot::drive::LoggedError;
+use linmot::linrs::Slave;
+use motion_io::can::Driver;
+use motion_io::endpoint::{CanEndpoint, Endpoint, EndpointError};
+use motion_io::linmot::serve_linrs;
+use motion_io::port::{Role, open};
+use pdo::NodeId;
+use serde_json::json;
+
+use super::cli::SimLinmot;
+use super::connect::checksum;
+use crate::can::stop_flag;
+use crate::exit::Exit;
+use crate::output::Output;
+
+/// The drive looks for the signal that stops it so often.
+const TURN: Duration = Duration::from_millis(50);
+
+pub(crate) fn run(out: &Output, arguments: &SimLinmot) -> Result<(), Exit> {
+    let mut drive = VirtualDrive::new(generated(arguments.parameters), Times::default());
+    // What a drive without motor data has logged by the time it is first used.
+    drive.log_error(LoggedError { code: 0x01, hours: 0, milliseconds: 120 });
+    drive.log_error(LoggedError { code: 0x64, hours: 920, milliseconds: 10_433 });
+    let mut state = arguments.state.as_deref().map(State::new);
+    if let Some(state) = &mut state {
+        state.load(&mut drive).map_err(|error| Exit::file(&state.path.display().to_string(), &error))?;
+    }
+    let stop = stop_flag()?;
+    let ready = |endpoint: &str| {
+        let node = arguments.node;
+        out.document(json!({ "event": "ready", "node": node, "endpoint": endpoint }), || {
+            out.say(&format!("LinMot drive {node} listening on {endpoint}"));
+        });
+    };
+    let mut keep = |drive: &VirtualDrive| state.as_mut().map_or(Ok(()), |state| state.keep(drive));
+    let usage = |error: EndpointError| Exit::usage(error.to_string());
+    if let Some(can) = &arguments.can {
+        let endpoint: CanEndpoint = can.parse().map_err(usage)?;
+        let node = NodeId::new(arguments.node).map_err(|error| Exit::usage(format!("--node: {error}")))?;
+        let port = motion_io::can::open(&endpoint).map_err(|error| Exit::trouble(error.to_string()))?;
+        let (mut driver, mut node) = (Driver::new(port), CanDrive::new(drive, node));
+        ready(can);
+        while !stop.load(Ordering::Relaxed) {
+            let limit = driver.now().saturating_add(TURN);
+            driver.turn(&mut node, limit, |_, _, _| ()).map_err(|error| Exit::file(can, &error))?;
+            keep(&node.drive).map_err(|error| Exit::file("the state file", &error))?;
+        }
+        return Ok(());
+    }
+    let serial = arguments.serial.as_deref().unwrap_or_default();
+    let endpoint: Endpoint = serial.parse().map_err(usage)?;
+    let mut port = open(&endpoint, Role::Device).map_err(|error| Exit::trouble(error.to_string()))?;
+    let mut slave = Slave::new(arguments.node, checksum(arguments.checksum));
+    ready(serial);
+    serve_linrs(port.as_mut(), &mut slave, &mut drive, &stop, |drive, _| keep(drive))
+        .map_err(|error| Exit::file(serial, &error))
+}
+
+/// Non-volatile memory in a file.
+struct State {
+    path: PathBuf,
+    /// Writes of the drive that the file holds.
+    kept: u64,
+}
+
+impl State {
+    fn new(path: &Path) -> Self {
+        Self { path: path.into(), kept: 0 }
+    }
+
+    fn load(&mut self, drive: &mut VirtualDrive) -> io::Result<()> {
+        match std::fs::read(&self.path) {
+            Ok(image) => drive.load_image(&image).map_err(io::Error::other),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => self.write(drive),
+            Err(error) => Err(error),
+        }
+    }
+
+    fn keep(&mut self, drive: &VirtualDrive) -> io::Result<()> {
+        if self.kept != drive.writes() {
+            self.kept = drive.writes();
+            self.write(drive)?;
+        }
+        Ok(())
+    }
+
+    /// The old file stays until the new one is complete.
+    fn write(&self, drive: &VirtualDrive) -> io::Result<()> {
+        let directory = self.path.parent().filter(|parent| !parent.as_os_str().is_empty());
+        let mut file = tempfile::NamedTempFile::new_in(directory.unwrap_or(Path::new(".")))?;
+        file.write_all(&drive.image())?;
+        file.persist(&self.path)?;
+        Ok(())
+    }
+}

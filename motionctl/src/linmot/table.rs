@@ -1,0 +1,288 @@
+//! `motionctl linmot table`.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use linmot::link::LinkExt;
+use linmot::request::Request;
+use linmot::table::{ENTRIES, Entry, LinkFault, Presence, check_links};
+use serde_json::{Value, json};
+
+use super::cli::{Drive, Table};
+use super::connect::{AnyLink, connect};
+use super::{stopped, text};
+use crate::cli::Global;
+use crate::exit::Exit;
+use crate::output::Output;
+
+type Entries = BTreeMap<u16, Entry>;
+
+/// Version of the TOML files.
+const FORMAT: i64 = 1;
+
+pub(super) fn run(out: &Output, global: &Global, command: &Table) -> Result<(), Exit> {
+    match command {
+        Table::List { drive } => {
+            let entries = read(out, &mut connect(global, drive)?)?;
+            show(out, &entries);
+            Ok(())
+        }
+        Table::Get { drive, entry } => {
+            let content = connect(global, drive)?.read_entry(*entry)?;
+            show(out, &Entries::from([(*entry, content)]));
+            Ok(())
+        }
+        Table::Set { drive, entry, raw } => set(out, global, drive, *entry, raw),
+        Table::Delete { drive, entry } => {
+            if global.dry_run {
+                out.say(&format!("would delete entry {entry}"));
+                return Ok(());
+            }
+            connect(global, drive)?.ask(Request::DeleteEntry { entry: *entry })?;
+            out.document(json!({ "deleted": entry }), || println!("entry {entry} deleted in RAM"));
+            Ok(())
+        }
+        Table::DeleteAll { drive } => {
+            if global.dry_run {
+                out.say("would delete all entries in RAM");
+                return Ok(());
+            }
+            out.confirm_on_terminal(global.yes, "Delete all command table entries in RAM?")?;
+            connect(global, drive)?.ask(Request::ClearTable)?;
+            out.document(json!({ "deleted": "all" }), || println!("no entries are left in RAM"));
+            Ok(())
+        }
+        Table::Save { drive } => {
+            if global.dry_run {
+                out.say("would save the command table to flash");
+                return Ok(());
+            }
+            out.confirm(global.yes, "Stop the MC software and write the command table to flash?")?;
+            stopped(&mut connect(global, drive)?, |link| Ok(link.ask(Request::SaveTable).map(|_| ())?))?;
+            out.document(json!({ "saved": true }), || println!("the command table is in flash"));
+            Ok(())
+        }
+        Table::Check { drive } => check(out, &read(out, &mut connect(global, drive)?)?),
+        Table::Backup { drive, file } => backup(out, global, drive, file),
+        Table::Restore { drive, file } => restore(out, global, drive, file),
+        Table::Compare { drive, file } => compare(out, global, drive, file),
+    }
+}
+
+fn read(out: &Output, link: &mut AnyLink) -> Result<Entries, Exit> {
+    let presence = link.presence()?;
+    let bar = out.progress("reading", presence.iter().count());
+    let mut entries = Entries::new();
+    for entry in presence.iter() {
+        entries.insert(entry, link.read_entry(entry)?);
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    Ok(entries)
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02X}")).collect()
+}
+
+fn parse(raw: &str) -> Result<Entry, String> {
+    let digits: String = raw.chars().filter(|c| !c.is_whitespace()).collect();
+    let bytes: Option<Vec<u8>> =
+        (0..digits.len()).step_by(2).map(|at| u8::from_str_radix(digits.get(at..at + 2)?, 16).ok()).collect();
+    let bytes = bytes.ok_or("hex digits in pairs expected")?;
+    Entry::parse(&bytes).map_err(|error| error.to_string())
+}
+
+fn to_json(number: u16, entry: &Entry) -> Value {
+    json!({
+        "entry": number,
+        "name": text(entry.name()),
+        "linked": entry.linked(),
+        "header": entry.header(),
+        "raw": hex(entry.bytes()),
+    })
+}
+
+fn show(out: &Output, entries: &Entries) {
+    let json: Vec<Value> = entries.iter().map(|(number, entry)| to_json(*number, entry)).collect();
+    out.document(json!({ "entries": json }), || {
+        if entries.is_empty() {
+            println!("no entries");
+        }
+        for (number, entry) in entries {
+            let linked = entry.linked().map_or(String::new(), |linked| format!(" -> {linked}"));
+            println!("{number:3}{linked}  {:04X}h  {}", entry.header(), text(entry.name()));
+            println!("     {}", hex(entry.parameters()));
+        }
+    });
+}
+
+fn set(out: &Output, global: &Global, drive: &Drive, number: u16, raw: &str) -> Result<(), Exit> {
+    let entry = parse(raw).map_err(|error| Exit::usage(format!("--raw: {error}")))?;
+    if global.dry_run {
+        out.say(&format!("would write entry {number}"));
+        return Ok(());
+    }
+    let mut link = connect(global, drive)?;
+    link.write_entry(number, &entry)?;
+    if link.read_entry(number)? != entry {
+        return Err(Exit::check(format!("entry {number}: other bytes were read back than written")));
+    }
+    show(out, &Entries::from([(number, entry)]));
+    Ok(())
+}
+
+fn faults(entries: &Entries) -> Vec<LinkFault> {
+    let mut presence = Presence::default();
+    entries.keys().for_each(|entry| presence.set(*entry, true));
+    let mut found = Vec::new();
+    let linked = |entry| entries.get(&entry).and_then(Entry::linked);
+    check_links(&presence, linked, |fault| found.push(fault));
+    found
+}
+
+fn check(out: &Output, entries: &Entries) -> Result<(), Exit> {
+    let found = faults(entries);
+    let json: Vec<Value> = found
+        .iter()
+        .map(|fault| match fault {
+            LinkFault::Missing { entry, linked } => {
+                json!({ "entry": entry, "fault": "missing", "linked": linked, "message": fault.to_string() })
+            }
+            LinkFault::Loop { entry, length } => {
+                json!({ "entry": entry, "fault": "loop", "length": length, "message": fault.to_string() })
+            }
+            _ => json!({ "message": fault.to_string() }),
+        })
+        .collect();
+    out.document(json!({ "entries": entries.len(), "faults": json }), || {
+        found.iter().for_each(|fault| println!("{fault}"));
+        println!("{} entries, {} faults", entries.len(), found.len());
+    });
+    // A loop may be what the machine is meant to do; a missing entry never is.
+    match found.iter().find(|fault| matches!(fault, LinkFault::Missing { .. })) {
+        Some(fault) => Err(Exit::check(fault.to_string())),
+        None => Ok(()),
+    }
+}
+
+fn backup(out: &Output, global: &Global, drive: &Drive, path: &Path) -> Result<(), Exit> {
+    let entries = read(out, &mut connect(global, drive)?)?;
+    let name = path.display().to_string();
+    if global.dry_run {
+        out.say(&format!("would write {} entries to {name}", entries.len()));
+        return Ok(());
+    }
+    let mut document = toml_edit::DocumentMut::new();
+    document.insert("format", toml_edit::value(FORMAT));
+    let mut list = toml_edit::ArrayOfTables::new();
+    for (number, entry) in &entries {
+        let mut table = toml_edit::Table::new();
+        table.insert("entry", toml_edit::value(i64::from(*number)));
+        table.insert("name", toml_edit::value(text(entry.name())));
+        if let Some(linked) = entry.linked() {
+            table.insert("linked", toml_edit::value(i64::from(linked)));
+        }
+        table.insert("header", toml_edit::value(i64::from(entry.header())));
+        table.insert("raw", toml_edit::value(hex(entry.bytes())));
+        list.push(table);
+    }
+    document.insert("entry", toml_edit::Item::ArrayOfTables(list));
+    std::fs::write(path, document.to_string()).map_err(|error| Exit::file(&name, &error))?;
+    out.document(json!({ "file": name, "entries": entries.len() }), || {
+        println!("{} entries written to {name}", entries.len());
+    });
+    Ok(())
+}
+
+/// Of each entry `raw` counts; name, link and header are there for people.
+fn load(path: &Path) -> Result<Entries, Exit> {
+    let name = path.display().to_string();
+    let content = std::fs::read_to_string(path).map_err(|error| Exit::file(&name, &error))?;
+    let document: toml_edit::DocumentMut = content.parse().map_err(|error| Exit::file(&name, &error))?;
+    if document.get("format").and_then(toml_edit::Item::as_integer) != Some(FORMAT) {
+        return Err(Exit::check(format!("{name}: no command table file: format = {FORMAT} expected")));
+    }
+    let mut entries = Entries::new();
+    let list = document.get("entry").and_then(toml_edit::Item::as_array_of_tables);
+    for (position, table) in (1..).zip(list.into_iter().flatten()) {
+        let wrong = |what: &str| Exit::check(format!("{name}: entry no. {position} of the file: {what}"));
+        let number = table
+            .get("entry")
+            .and_then(toml_edit::Item::as_integer)
+            .and_then(|number| u16::try_from(number).ok())
+            .filter(|number| ENTRIES.contains(number))
+            .ok_or_else(|| wrong("entry = 1 to 255 expected"))?;
+        let raw =
+            table.get("raw").and_then(|item| item.as_str()).ok_or_else(|| wrong("raw = \"…\" expected"))?;
+        let entry = parse(raw).map_err(|error| wrong(&error))?;
+        if entries.insert(number, entry).is_some() {
+            return Err(wrong(&format!("entry {number} occurs twice")));
+        }
+    }
+    Ok(entries)
+}
+
+fn restore(out: &Output, global: &Global, drive: &Drive, path: &Path) -> Result<(), Exit> {
+    let entries = load(path)?;
+    if let Some(fault) = faults(&entries).iter().find(|fault| matches!(fault, LinkFault::Missing { .. })) {
+        return Err(Exit::check(format!("{}: {fault}", path.display())));
+    }
+    if global.dry_run {
+        out.say(&format!("would write {} entries to RAM and flash", entries.len()));
+        return Ok(());
+    }
+    out.confirm(global.yes, "Stop the MC software and write the command table to RAM and flash?")?;
+    let mut link = connect(global, drive)?;
+    let mut written = 0;
+    let restored = stopped(&mut link, |link| {
+        let present = link.presence()?;
+        for entry in present.iter().filter(|entry| !entries.contains_key(entry)) {
+            link.ask(Request::DeleteEntry { entry })?;
+        }
+        let bar = out.progress("writing", entries.len());
+        for (number, entry) in &entries {
+            link.write_entry(*number, entry)?;
+            written += 1;
+            bar.inc(1);
+        }
+        bar.finish_and_clear();
+        link.ask(Request::SaveTable)?;
+        Ok(())
+    });
+    restored.map_err(|exit| {
+        let all = entries.len();
+        exit.context(&format!("{written} of {all} entries were written, the same restore completes it"))
+    })?;
+    out.document(json!({ "entries": entries.len(), "saved": true }), || {
+        println!("{} entries written to RAM and flash", entries.len());
+    });
+    Ok(())
+}
+
+fn compare(out: &Output, global: &Global, drive: &Drive, path: &Path) -> Result<(), Exit> {
+    let wanted = load(path)?;
+    let found = read(out, &mut connect(global, drive)?)?;
+    let numbers = |from: &Entries, other: &Entries| -> Vec<u16> {
+        from.keys().filter(|number| !other.contains_key(number)).copied().collect()
+    };
+    let (missing, extra) = (numbers(&wanted, &found), numbers(&found, &wanted));
+    let different: Vec<u16> = wanted
+        .iter()
+        .filter(|(number, entry)| found.get(number).is_some_and(|other| other != *entry))
+        .map(|(number, _)| *number)
+        .collect();
+    let equal = wanted.len() - missing.len() - different.len();
+    let json = json!({ "equal": equal, "different": different, "only_file": missing, "only_drive": extra });
+    out.document(json, || {
+        different.iter().for_each(|entry| println!("entry {entry} differs"));
+        missing.iter().for_each(|entry| println!("entry {entry} is not in the drive"));
+        extra.iter().for_each(|entry| println!("entry {entry} is not in the file"));
+        println!("{equal} equal");
+    });
+    if different.is_empty() && missing.is_empty() && extra.is_empty() {
+        Ok(())
+    } else {
+        Err(Exit::check("file and drive differ"))
+    }
+}

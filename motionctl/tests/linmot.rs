@@ -1,0 +1,174 @@
+//! A virtual LinMot drive on pseudo-terminals, and every command that talks to it, over each carrier.
+#![cfg(unix)]
+
+mod common;
+
+use common::{Bench, Controller, edit};
+use serde_json::Value;
+
+/// The drive, and the arguments that reach it.
+const CARRIERS: [(&str, &[&str]); 3] = [
+    ("--serial=pty:LINE", &["--port", "LINE"]),
+    ("--can=slcan-pty:LINE", &["--can", "slcan:LINE"]),
+    ("--can=slcan-pty:LINE", &["--can", "slcan:LINE", "--carrier", "pdo"]),
+];
+
+/// Manual B, figure 13.
+const CURVE: &str = "# name=Example_Curve length_ms=200 unit=0.1um\n0\n30154\n116978\n250000\n413176\n586824\n750000\n883022\n969846\n1000000\n";
+
+struct Linmot<'a> {
+    bench: &'a Bench,
+    carrier: &'a [&'a str],
+}
+
+impl Linmot<'_> {
+    fn run(&self, arguments: &[&str]) -> common::Ran {
+        let mut all = vec!["linmot"];
+        all.extend(arguments.iter().take_while(|argument| **argument != "--"));
+        all.extend(self.carrier);
+        all.extend(arguments.iter().skip_while(|argument| **argument != "--"));
+        self.bench.run(&all)
+    }
+
+    #[track_caller]
+    fn json(&self, arguments: &[&str]) -> Value {
+        let mut all = vec!["--json"];
+        all.extend(arguments);
+        self.run(&all).ends(0).json()
+    }
+}
+
+fn drive(bench: &Bench, endpoint: &str) -> Controller {
+    bench.device(&["sim", "linmot", endpoint, "--state", "FLASH"])
+}
+
+fn entry(link: u16, name: &str) -> String {
+    let [low, high] = link.to_le_bytes();
+    let name: String = name.bytes().map(|byte| format!("{byte:02X}")).collect();
+    format!("01A7{low:02X}{high:02X}0001{:0<64}{name:0<32}{:0<20}", "", "")
+}
+
+/// Backup to PVL → factory default → restart → restore → save → restart → compare equal.
+#[test]
+fn a_drive_comes_back_from_its_files_over_every_carrier() {
+    for (endpoint, carrier) in CARRIERS {
+        let bench = Bench::new();
+        let drive = drive(&bench, endpoint);
+        let linmot = Linmot { bench: &bench, carrier };
+        std::fs::write(bench.path("C.csv"), CURVE).unwrap();
+        linmot.run(&["params", "set", "11A2h", "--", "-5"]).ends(0);
+        linmot.run(&["params", "set", "13A2h", "--", "77"]).ends(0);
+        linmot.run(&["params", "set", "03F2h", "--", "X Axis Left"]).ends(0);
+        linmot.run(&["curve", "add", "23", "C.csv"]).ends(0);
+        linmot.run(&["curve", "save", "--yes"]).ends(0);
+        linmot.run(&["table", "set", "3", "--raw", &entry(7, "Move out")]).ends(0);
+        linmot.run(&["table", "set", "7", "--raw", &entry(0xFFFF, "Move back")]).ends(0);
+        linmot.run(&["table", "save", "--yes"]).ends(0);
+
+        let backup = linmot.json(&["pvl", "backup", "B.pvl"]);
+        assert_eq!((backup["parameters"].as_u64(), backup["curves"].as_u64()), (Some(37), Some(1)));
+        linmot.run(&["table", "backup", "T.toml"]).ends(0).says("2 entries");
+        let text = std::fs::read_to_string(bench.path("B.pvl")).unwrap();
+        // Manual B, table 1.
+        for row in ["03F3h, 78412058h", "03F4h, 4C207369h", "03F5h, 00746665h", "000F4240h"] {
+            assert!(text.contains(row), "{row}");
+        }
+        linmot.run(&["params", "defaults", "--layer", "os", "mc", "interface", "application"]).ends(0);
+        linmot.run(&["curve", "delete-all"]).ends(0);
+        linmot.run(&["curve", "save", "--yes"]).ends(0);
+        linmot.run(&["table", "delete-all"]).ends(0);
+        linmot.run(&["table", "save", "--yes"]).ends(0);
+        linmot.run(&["restart", "--wait"]).ends(0);
+        linmot
+            .run(&["pvl", "compare", "B.pvl"])
+            .ends(1)
+            .says("curve 23 is not in the drive")
+            .says("6 differences");
+        linmot.run(&["table", "compare", "T.toml"]).ends(1).says("entry 3 is not in the drive");
+
+        linmot.run(&["--dry-run", "pvl", "restore", "B.pvl"]).ends(0).says("5 of them would be written");
+        linmot.run(&["pvl", "restore", "B.pvl"]).ends(2).says("--yes");
+        let restored = linmot.json(&["--yes", "pvl", "restore", "B.pvl"]);
+        assert_eq!((restored["written"].as_u64(), restored["curves"].as_u64()), (Some(5), Some(1)));
+        linmot.run(&["--yes", "table", "restore", "T.toml"]).ends(0);
+        linmot.run(&["restart", "--wait"]).ends(0);
+        let compared = linmot.json(&["pvl", "compare", "B.pvl"]);
+        assert_eq!(
+            (compared["equal"].as_bool(), compared["equal_parameters"].as_u64()),
+            (Some(true), Some(37))
+        );
+        linmot.run(&["table", "compare", "T.toml"]).ends(0).says("2 equal");
+        let get = linmot.json(&["params", "get", "03F2h"]);
+        assert_eq!(get["parameters"][0]["text"], "X Axis Left");
+
+        // Power fails: what was saved is there.
+        drive.kill();
+        let _drive = self::drive(&bench, endpoint);
+        linmot.run(&["pvl", "compare", "B.pvl"]).ends(0);
+        linmot.run(&["curve", "get", "23", "-o", "D.csv"]).ends(0);
+        let again = std::fs::read_to_string(bench.path("D.csv")).unwrap();
+        assert_eq!(again.lines().skip(1).collect::<Vec<_>>(), CURVE.lines().skip(1).collect::<Vec<_>>());
+        linmot.run(&["curve", "modify", "23", "D.csv"]).ends(0);
+        linmot.run(&["curve", "plot", "23", "-o", "D.svg"]).ends(0);
+        assert!(std::fs::read_to_string(bench.path("D.svg")).unwrap().starts_with("<svg "));
+        let errors = linmot.json(&["errors"]);
+        assert_eq!((errors["logged"].as_u64(), errors["errors"][0]["code"].as_u64()), (Some(2), Some(0x64)));
+        assert_eq!(errors["errors"][0]["text"], "Cfg Err: No Motor Defined");
+    }
+}
+
+#[test]
+fn refusals_are_named() {
+    for (endpoint, carrier) in CARRIERS {
+        let bench = Bench::new();
+        let drive = drive(&bench, endpoint);
+        let linmot = Linmot { bench: &bench, carrier };
+        linmot.run(&["params", "get", "1111h"]).ends(4).says("UPID error");
+        linmot.run(&["params", "set", "2136h", "--rom", "--", "1"]).ends(4).says("address usage error");
+        linmot.run(&["params", "set", "119Eh", "--ram", "--", "1"]).ends(4).says("not live");
+        linmot.run(&["params", "set", "119Eh", "--", "32001"]).ends(4).says("range error");
+        linmot.run(&["params", "set", "119Eh", "--", "x"]).ends(2).says("a number of 32 bits expected");
+        linmot.run(&["curve", "get", "5", "-o", "X"]).ends(4).says("no such curve");
+        std::fs::write(bench.path("C.csv"), CURVE).unwrap();
+        linmot.run(&["curve", "modify", "5", "C.csv"]).ends(4).says("no such curve");
+        linmot.run(&["curve", "add", "5", "C.csv"]).ends(0);
+        linmot.run(&["curve", "add", "5", "C.csv"]).ends(4).says("a curve with this ID exists");
+        edit(&bench.path("C.csv"), "30154\n", "");
+        linmot.run(&["curve", "modify", "5", "C.csv"]).ends(4).says("size error");
+        linmot.run(&["curve", "add", "101", "C.csv"]).ends(1).says("1 to 100 expected");
+        linmot.run(&["table", "get", "9"]).ends(4).says("no such entry");
+        linmot.run(&["table", "set", "9", "--raw", "00"]).ends(2).says("64 expected");
+        linmot.run(&["table", "set", "9", "--raw", &entry(10, "x")]).ends(0);
+        linmot.run(&["table", "check"]).ends(1).says("entry 9 is linked to entry 10, which does not exist");
+
+        // Files that do not fit the drive: nothing is written.
+        linmot.run(&["pvl", "backup", "B.pvl"]).ends(0);
+        for (from, to, words) in [
+            ("@TreeID 4612", "@TreeID 4613", "layer mc: tree ID 4613 in the file, 4612 in the drive"),
+            ("@SubVersion 5", "@SubVersion 6", "layer interface: sub version 6 in the file, 5 in the drive"),
+            ("13A2h, ", "13B2h, ", "UPID 13B2h is unknown to the drive"),
+            ("119Eh, ", "1B62h, ", "UPID 1B62h is read-only in the drive"),
+            ("119Eh, 0000", "119Eh, 000x", "a hex number of up to 8 digits expected"),
+        ] {
+            std::fs::copy(bench.path("B.pvl"), bench.path("X.pvl")).unwrap();
+            edit(&bench.path("X.pvl"), from, to);
+            linmot.run(&["--yes", "pvl", "restore", "X.pvl"]).ends(1).says(words);
+        }
+        drive.kill();
+        let gone = linmot.run(&["--timeout", "0.2", "params", "get", "13A2h"]);
+        assert!([3, 5].contains(&gone.0.status.code().unwrap()), "{}", gone.stderr());
+    }
+}
+
+#[test]
+fn files_are_checked_without_a_drive() {
+    let bench = Bench::new();
+    let file = "FileType PVL\nStartObject Parameter\nTreeLayer 2\nTreeID 4612\nMainVersion 3\nSubVersion 0\nStartData\n1194;2\n119E;x\nEndData\nEndObject\n";
+    std::fs::write(bench.path("F.pvl"), file).unwrap();
+    let json = bench.run(&["linmot", "pvl", "check", "F.pvl", "--json"]).ends(1).json();
+    assert_eq!(json["objects"][0]["tree_id"], 4612);
+    let diagnostics = json["diagnostics"].as_array().unwrap();
+    assert_eq!((diagnostics.len(), diagnostics[0]["line"].as_u64()), (1, Some(9)));
+    assert_eq!(diagnostics[0]["severity"], "error");
+    bench.run(&["linmot", "pvl", "check", "none.pvl"]).ends(5);
+}
