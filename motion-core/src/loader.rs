@@ -4,6 +4,7 @@
 
 use lb2::code::LoaderCode;
 
+use crate::bus::{OBJECTS, Role, Settings};
 use crate::parameters::{RangeError, Values};
 
 /// One rule of the loader.
@@ -42,7 +43,7 @@ pub const SIX_AXES_VELOCITY: i32 = 2_730_666;
 const VELOCITIES: [u16; 10] = [642, 684, 756, 762, 768, 774, 792, 798, 912, 918];
 
 /// All rules, errors before warnings; of two parameters at fault, that of the earlier rule is named.
-pub static RULES: [Rule; 10] = [
+pub static RULES: [Rule; 12] = [
     Rule {
         code: LoaderCode(0x83),
         message: "Invalid number of actual value inputs",
@@ -155,7 +156,52 @@ pub static RULES: [Rule; 10] = [
             }
         },
     },
+    Rule {
+        code: LoaderCode(0x8D),
+        message: "CAN Link on a bus with axis objects",
+        clause: "6.5.1",
+        // 3 is `Axis`; the objects of CAN 2 are axes as delivered.
+        check: |values, fault| {
+            for (bus, kind) in [326, 358].into_iter().enumerate() {
+                if values.at(302, bus) == 1 && (0..8).any(|object| values.at(kind, object) == 3) {
+                    fault(302 + bus as u16);
+                }
+            }
+        },
+    },
+    Rule {
+        code: LoaderCode(0x8E),
+        message: "Two objects have the same identifier",
+        clause: "6.5.1.1",
+        check: |values, fault| {
+            for (bus, address) in [310, 342].into_iter().enumerate() {
+                let mut taken = [None; 2 * OBJECTS];
+                for (place, id) in identifiers(values, bus).into_iter().enumerate() {
+                    if id.is_some() && taken.contains(&id) {
+                        fault(address + place as u16);
+                    }
+                    if let Some(slot) = taken.get_mut(place) {
+                        *slot = id;
+                    }
+                }
+            }
+        },
+    },
 ];
+
+/// Identifiers of objects IN 1…4 and OUT 1…4 of a CANopen bus, as far as they are active.
+fn identifiers(values: &Values, bus: usize) -> [Option<u16>; 2 * OBJECTS] {
+    let (role, settings) = (Role::read(values, bus), Settings::read(values, bus));
+    let mut ids = [None; 2 * OBJECTS];
+    let inputs = settings.inputs.into_iter().map(|object| (object, true));
+    let outputs = settings.outputs.into_iter().map(|object| (object, false));
+    if role != Role::Link {
+        for (id, (object, input)) in ids.iter_mut().zip(inputs.chain(outputs)) {
+            *id = object.map(|object| object.id(role, input));
+        }
+    }
+    ids
+}
 
 /// A port that LB2 uses must not check for odd parity (Appendix 1, "Transmission").
 pub static ODD_PARITY: Rule = Rule {
@@ -284,6 +330,15 @@ mod tests {
         assert_eq!(findings(&[(217, 0)]), [(217, 0x8B)]);
         assert_eq!(findings(&[(337, 1), (313, 10), (341, 1), (317, 11)]), [(337, 0x8C), (341, 0x8C)]);
         assert_eq!(findings(&[(337, 1), (313, 10), (341, 1), (317, 10)]), []);
+        assert_eq!(findings(&[(303, 1)]), [(303, 0x8D)]);
+        assert_eq!(findings(&[(302, 1), (327, 3)]), [(302, 0x8D)]);
+        assert_eq!(findings(&[(302, 1), (327, 1)]), []);
+        let no_axes: Vec<(u16, i32)> = (358..=365).map(|index| (index, 0)).chain([(303, 1)]).collect();
+        assert_eq!(findings(&no_axes), []);
+        // IN 1 and IN 2 both listen to TPDO 1 of node 5; analog ones to TPDO 2.
+        assert_eq!(findings(&[(326, 1), (327, 1), (310, 5), (311, 5)]), [(311, 0x8E)]);
+        assert_eq!(findings(&[(326, 1), (327, 2), (310, 5), (311, 5)]), []);
+        assert_eq!(findings(&[(330, 4), (331, 1), (314, 5), (315, 5)]), [(315, 0x8E)]);
         assert_eq!(findings(&[(10, 1)]), [(10, 0x03)]);
         assert_eq!(findings(&[(9, 1)]), []);
     }

@@ -44,6 +44,9 @@ impl Access for Dictionary {
     }
 }
 
+/// Process data are the bus's, not the dictionary's.
+impl slave::Objects for Dictionary {}
+
 /// A slave of this model at an address.
 pub(super) fn new(model: u16, node: Option<NodeId>) -> Slave {
     let mut name = *b"GEL 0000";
