@@ -1,6 +1,6 @@
 //! Many axes at once.
 
-use super::profile::Profile;
+use super::profile::{Profile, SIXTH};
 
 /// Axes of a bank.
 const LANES: usize = 64;
@@ -142,6 +142,6 @@ impl Bank {
         set(&mut self.start, phase.position);
         set(&mut self.speed, phase.velocity);
         set(&mut self.half_acceleration, phase.acceleration / 2.0);
-        set(&mut self.sixth_jerk, phase.jerk / 6.0);
+        set(&mut self.sixth_jerk, phase.jerk * SIXTH);
     }
 }

@@ -3,8 +3,8 @@
 
 use super::limits::Limits;
 use super::math::sqrt;
-use super::profile::{Phase, Profile, State};
-use super::ramp::{Bounds, Leg, Ramp, resting_velocity, restore};
+use super::profile::{Phase, Profile, SIXTH, State};
+use super::ramp::{Bounds, Ramp, change_way, resting_velocity, restore, rise};
 use super::search;
 use super::solve::{self, Peak};
 
@@ -19,37 +19,98 @@ const MAX_RESTORES: usize = 3;
 struct Drive<'a> {
     profile: &'a mut Profile,
     jerk: f64,
+    /// Phases so far.
+    len: usize,
     time: f64,
     /// Position from the start, velocity, acceleration.
     state: State,
 }
 
 impl Drive<'_> {
-    #[inline]
+    #[inline(always)]
     fn leg(&mut self, time: f64, jerk: f64) {
         if time > 0.0 {
-            let phase = self.put(jerk * self.jerk);
+            let phase = self.put(self.state, jerk * self.jerk);
             self.time += time;
             self.state = phase.after(time);
         }
     }
 
-    #[inline]
-    fn put(&mut self, jerk: f64) -> Phase {
-        let State { position, velocity, acceleration } = self.state;
+    #[inline(always)]
+    fn put(&mut self, state: State, jerk: f64) -> Phase {
+        let State { position, velocity, acceleration } = state;
         let phase = Phase { begin: self.time, position, velocity, acceleration, jerk };
-        push(self.profile, phase);
+        if let Some(slot) = self.profile.phases.get_mut(self.len) {
+            *slot = phase;
+            self.len += 1;
+        }
         phase
     }
 
-    /// Constant velocity as long as it takes from here to the first leg of `tail`, then those legs,
-    /// computed backward from the end.
-    #[inline]
-    fn arrive(&mut self, tail: &[Leg], cruise: Option<f64>) {
+    fn end(&mut self) {
+        self.profile.len = self.len;
+        self.profile.duration = self.time;
+    }
+
+    /// With constant velocity, if one is given, up to `start`, where the phases counted from the
+    /// target begin.
+    #[inline(always)]
+    fn cruise(&mut self, velocity: Option<f64>, start: f64) {
+        if let Some(velocity) = velocity {
+            self.state.velocity = velocity;
+            self.state.acceleration = 0.0;
+            let gap = self.profile.end.position - self.profile.start + (start - self.state.position);
+            let time = gap / velocity;
+            if time > 0.0 {
+                self.put(self.state, 0.0);
+                self.time += time;
+            }
+        }
+        self.profile.tail = self.len;
+    }
+
+    /// The stop at the target, from velocity `u` without acceleration, or from where the jerk −1 that
+    /// comes from there has made it `a`; computed backward from the end.
+    #[inline(always)]
+    fn stop(&mut self, u: f64, a: f64, fall: f64, sign: f64, velocity: Option<f64>) {
+        let scale = self.jerk * sign;
+        let peak = sqrt(u).min(fall);
+        let hold = if peak == fall { (u / peak - peak).max(0.0) } else { 0.0 };
+        // Velocity and way left, when the last leg begins, when the hold begins, and at `a`.
+        let half = peak * peak * 0.5;
+        let last = peak * half * (2.0 * SIXTH);
+        let held = half + peak * hold;
+        let way = last + hold * (half + held) * 0.5;
+        let first = peak + a;
+        let start = u - a * a * 0.5;
+        let whole = way + first * (held + first * (peak * 0.5 - first * SIXTH));
+        let state = |way: f64, velocity: f64, acceleration: f64| State {
+            position: -way * scale,
+            velocity: velocity * scale,
+            acceleration: acceleration * scale,
+        };
+        self.cruise(velocity, -whole * scale);
+        if first > 0.0 {
+            self.put(state(whole, start, a), -scale);
+            self.time += first;
+        }
+        if hold > 0.0 {
+            self.put(state(way, held, -peak), 0.0);
+            self.time += hold;
+        }
+        if peak > 0.0 {
+            self.put(state(last, half, -peak), scale);
+            self.time += peak;
+        }
+        self.end();
+    }
+
+    /// The change to the final velocity at the target, from velocity and acceleration; computed backward
+    /// from the end.
+    fn arrive(&mut self, ramp: &Ramp, velocity: Option<f64>) {
         let mut states = [State::default(); 6];
-        let end = self.profile.end;
-        let mut state = State { position: 0.0, ..end };
-        for (leg, slot) in tail.iter().zip(&mut states).rev() {
+        let mut state = State { position: 0.0, ..self.profile.end };
+        for (leg, slot) in ramp.legs().iter().zip(&mut states).rev() {
             let back = Phase {
                 begin: 0.0,
                 position: state.position,
@@ -60,31 +121,12 @@ impl Drive<'_> {
             state = back.after(-leg.time);
             *slot = state;
         }
-        if let Some(velocity) = cruise {
-            self.state.velocity = velocity;
-            self.state.acceleration = 0.0;
-            let gap = end.position - self.profile.start + (state.position - self.state.position);
-            let time = gap / velocity;
-            if time > 0.0 {
-                self.put(0.0);
-                self.time += time;
-            }
-        }
-        self.profile.tail = self.profile.len;
-        for (leg, state) in tail.iter().zip(&states) {
-            self.state = *state;
-            self.put(leg.jerk * self.jerk);
+        self.cruise(velocity, state.position);
+        for (leg, state) in ramp.legs().iter().zip(&states) {
+            self.put(*state, leg.jerk * self.jerk);
             self.time += leg.time;
         }
-        self.profile.duration = self.time;
-    }
-}
-
-#[inline]
-pub(super) fn push(profile: &mut Profile, phase: Phase) {
-    if let Some(slot) = profile.phases.get_mut(profile.len) {
-        *slot = phase;
-        profile.len += 1;
+        self.end();
     }
 }
 
@@ -102,10 +144,9 @@ fn normalise(limits: &Limits) -> (Bounds, f64) {
 impl Profile {
     /// Brings the acceleration back inside its bound; returns what the profile goes on with.
     #[inline]
-    fn drive(&mut self, from: &State, jerk: f64, bounds: &Bounds) -> Drive<'_> {
-        let scale = 1.0 / jerk;
+    fn drive(&mut self, from: &State, jerk: f64, scale: f64, bounds: &Bounds) -> Drive<'_> {
         let state = State { position: 0.0, ..*from };
-        let mut drive = Drive { profile: self, jerk, time: 0.0, state };
+        let mut drive = Drive { profile: self, jerk, len: 0, time: 0.0, state };
         for _ in 0..MAX_RESTORES {
             let (v, a) = (drive.state.velocity * scale, drive.state.acceleration * scale);
             let Some(leg) = restore(v, a, bounds) else { break };
@@ -127,7 +168,7 @@ impl Profile {
 
     pub(super) fn plan_velocity(&mut self, from: &State, limits: &Limits, velocity: f64) {
         let (bounds, scale) = normalise(limits);
-        let mut drive = self.drive(from, limits.jerk(), &bounds);
+        let mut drive = self.drive(from, limits.jerk(), scale, &bounds);
         drive.ramp(velocity, scale, &bounds);
         let position = from.position + drive.state.position;
         self.end = State { position, velocity, acceleration: 0.0 };
@@ -137,19 +178,21 @@ impl Profile {
     pub(super) fn plan_position(&mut self, from: &State, limits: &Limits, target: f64, velocity: f64) {
         let (bounds, scale) = normalise(limits);
         self.end = State { position: target, velocity, acceleration: 0.0 };
-        let mut drive = self.drive(from, limits.jerk(), &bounds);
+        let mut drive = self.drive(from, limits.jerk(), scale, &bounds);
         let (v, a) = (drive.state.velocity * scale, drive.state.acceleration * scale);
         let d = (target - from.position - drive.state.position) * scale;
         let last = velocity * scale;
         let resting = resting_velocity(v, a);
         // The way of going to the final velocity at once tells the direction.
-        let (direct, size) = if last == 0.0 {
+        let (direct, size) = if last == 0.0 && v == 0.0 && a == 0.0 {
+            (0.0, 0.0)
+        } else if last == 0.0 {
             let sign = 1.0_f64.copysign(resting);
             let (v, a) = (v * sign, a * sign);
             let way = solve::stop(v, a, bounds.fall) * sign;
             (way, solve::stopping_way(v + a * a / 2.0, bounds.fall))
         } else {
-            let way = Ramp::to(v, a, last, &bounds).way(v, a);
+            let way = change_way(v, a, last, &bounds);
             (way, way.abs())
         };
         let size =
@@ -186,10 +229,10 @@ impl Drive<'_> {
     /// Straight to a velocity, ending there.
     fn ramp(&mut self, velocity: f64, scale: f64, bounds: &Bounds) {
         let (v, a) = (self.state.velocity * scale, self.state.acceleration * scale);
-        for leg in Ramp::to(v, a, velocity * scale, bounds).legs() {
+        for leg in Ramp::to(v, a, velocity * scale, 1.0, bounds).legs() {
             self.leg(leg.time, leg.jerk);
         }
-        self.profile.duration = self.time;
+        self.end();
     }
 
     /// In the direction `sign` as far as can be, then to the end. `way` leads from the profile's start
@@ -215,36 +258,26 @@ impl Drive<'_> {
         let d = (way - self.state.position) * turn;
         let peak =
             if last == 0.0 { solve::peak(v, a, d, bounds) } else { search::peak(v, a, d, last, bounds) };
-        match peak {
+        let (u, a, cruise) = match peak {
             Peak::Release(alpha) => {
                 let time = alpha - a;
                 self.leg(time, sign);
-                let then = v + time * (a + time / 2.0);
-                self.tail(then, alpha, last, sign, bounds, None);
+                let then = v + time * (a + time * 0.5);
+                (then + alpha * alpha * 0.5, alpha, None)
             }
             Peak::Velocity(u) => {
-                self.legs(&Ramp::to(v, a, u, bounds), sign);
-                self.tail(u, 0.0, last, sign, bounds, None);
+                rise(v, a, u, bounds, |time, jerk| self.leg(time, jerk * sign));
+                (u, 0.0, None)
             }
             Peak::Cruise => {
-                self.legs(&Ramp::to(v, a, highest, bounds), sign);
-                let velocity = highest * sign * self.jerk;
-                self.tail(highest, 0.0, last, sign, bounds, Some(velocity));
+                rise(v, a, highest, bounds, |time, jerk| self.leg(time, jerk * sign));
+                (highest, 0.0, Some(highest * sign * self.jerk))
             }
+        };
+        if last == 0.0 {
+            self.stop(u, a, bounds.fall, sign, cruise);
+        } else {
+            self.arrive(&Ramp::to(u - a * a * 0.5, a, last, sign, bounds), cruise);
         }
-    }
-
-    #[inline]
-    fn legs(&mut self, ramp: &Ramp, sign: f64) {
-        for leg in ramp.legs() {
-            self.leg(leg.time, leg.jerk * sign);
-        }
-    }
-
-    #[inline]
-    fn tail(&mut self, v: f64, a: f64, last: f64, sign: f64, bounds: &Bounds, cruise: Option<f64>) {
-        let mut ramp = Ramp::to(v, a, last, bounds);
-        ramp.turn(sign);
-        self.arrive(ramp.legs(), cruise);
     }
 }

@@ -2,6 +2,7 @@
 //! positions are those of the axis divided by its jerk, and times stay what they are.
 
 use super::math::sqrt;
+use super::profile::SIXTH;
 
 /// Normalised limits: what [`super::Limits`] says, divided by the jerk.
 #[derive(Debug, Clone, Copy)]
@@ -42,7 +43,7 @@ pub(super) struct Leg {
     pub(super) jerk: f64,
 }
 
-/// The legs of one change of velocity, in order; legs of no duration are left out.
+/// The legs of one change of velocity, in order.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Ramp {
     legs: [Leg; 6],
@@ -50,87 +51,83 @@ pub(super) struct Ramp {
 }
 
 impl Ramp {
-    #[inline]
-    fn push(&mut self, time: f64, jerk: f64) {
-        if time > 0.0
-            && let Some(leg) = self.legs.get_mut(self.len)
-        {
-            *leg = Leg { time, jerk };
-            self.len += 1;
-        }
-    }
-
-    #[inline]
-    pub(super) fn legs(&self) -> &[Leg] {
-        self.legs.get(..self.len).unwrap_or(&[])
-    }
-
-    /// The same for an axis that runs the other way, if `sign` is −1.
-    #[inline]
-    pub(super) fn turn(&mut self, sign: f64) {
-        for leg in &mut self.legs {
-            leg.jerk *= sign;
-        }
-    }
-
-    /// Way from a state, over all legs.
-    pub(super) fn way(&self, mut v: f64, mut a: f64) -> f64 {
-        let mut way = 0.0;
-        for &Leg { time, jerk } in self.legs() {
-            way += time * (v + time * (a / 2.0 + time * jerk / 6.0));
-            v += time * (a + time * jerk / 2.0);
-            a += time * jerk;
-        }
-        way
-    }
-
-    /// The fastest way from velocity and acceleration to `target` without acceleration. The start
-    /// must be one that [`restore`] leaves.
-    #[inline]
-    pub(super) fn to(v: f64, a: f64, target: f64, bounds: &Bounds) -> Self {
+    /// The fastest way from velocity and acceleration to `target` without acceleration, for an axis
+    /// that runs the other way if `turn` is −1.
+    pub(super) fn to(v: f64, a: f64, target: f64, turn: f64, bounds: &Bounds) -> Self {
         let mut ramp = Self::default();
-        if target >= resting_velocity(v, a) {
-            ramp.rise(v, a, target, bounds, 1.0);
-        } else {
-            ramp.rise(-v, -a, -target, bounds, -1.0);
-        }
+        change(v, a, target, bounds, |time, jerk| {
+            if time > 0.0
+                && let Some(leg) = ramp.legs.get_mut(ramp.len)
+            {
+                *leg = Leg { time, jerk: jerk * turn };
+                ramp.len += 1;
+            }
+        });
         ramp
     }
 
-    #[inline]
-    fn rise(&mut self, v: f64, a: f64, target: f64, bounds: &Bounds, sign: f64) {
-        let w = v - a * a / 2.0;
-        let most = bounds.crossing();
-        let through_zero = target > 0.0 && bounds.crosses(v, a, w);
-        if through_zero && target > most * most / 2.0 {
-            // The acceleration has to be `most` at velocity 0, with the other bound on either side.
-            let up = bounds.fall.min(sqrt(most * most / 2.0 - w));
-            self.push(up - a, sign);
-            if up == bounds.fall {
-                self.push((most * most / 2.0 - w) / up - up, 0.0);
-            }
-            self.push(up - most, -sign);
-            self.single(most, target + most * most / 2.0, bounds.grow, sign);
-        } else {
-            let falls = target <= 0.0 || through_zero;
-            self.single(a, target - w, if falls { bounds.fall } else { bounds.grow }, sign);
-        }
+    pub(super) fn legs(&self) -> &[Leg] {
+        self.legs.get(..self.len).unwrap_or(&[])
     }
+}
 
-    /// Up from acceleration `a` to at most `bound` and back to none; `gain` is the gain of velocity as
-    /// if it began at acceleration 0.
-    #[inline]
-    fn single(&mut self, a: f64, gain: f64, bound: f64, sign: f64) {
-        let peak = sqrt(gain);
-        if peak > bound {
-            self.push(bound - a, sign);
-            self.push(gain / bound - bound, 0.0);
-            self.push(bound, -sign);
-        } else {
-            self.push(peak - a, sign);
-            self.push(peak, -sign);
+/// Way of the fastest change of velocity to `target`.
+pub(super) fn change_way(mut v: f64, mut a: f64, target: f64, bounds: &Bounds) -> f64 {
+    let mut way = 0.0;
+    change(v, a, target, bounds, |time, jerk| {
+        if time > 0.0 {
+            way += time * (v + time * (a * 0.5 + time * jerk * SIXTH));
+            v += time * (a + time * jerk * 0.5);
+            a += time * jerk;
         }
+    });
+    way
+}
+
+/// The fastest way from velocity and acceleration to `target` without acceleration: its legs, time and
+/// jerk, in order; those whose time is not positive are none. The start must be one that [`restore`]
+/// leaves.
+#[inline]
+fn change(v: f64, a: f64, target: f64, bounds: &Bounds, mut leg: impl FnMut(f64, f64)) {
+    if target >= resting_velocity(v, a) {
+        rise(v, a, target, bounds, leg);
+    } else {
+        rise(-v, -a, -target, bounds, |time, jerk| leg(time, -jerk));
     }
+}
+
+/// As [`change`], to a velocity that is not below the resting velocity.
+#[inline(always)]
+pub(super) fn rise(v: f64, a: f64, target: f64, bounds: &Bounds, mut leg: impl FnMut(f64, f64)) {
+    let w = v - a * a * 0.5;
+    let through_zero = target > 0.0 && bounds.crosses(v, a, w);
+    let half = bounds.crossing() * bounds.crossing() * 0.5;
+    if through_zero && target > half {
+        // The acceleration has to be `most` at velocity 0, with the other bound on either side.
+        let most = bounds.crossing();
+        let up = bounds.fall.min(sqrt(half - w));
+        leg(up - a, 1.0);
+        if up == bounds.fall {
+            leg((half - w) / up - up, 0.0);
+        }
+        leg(up - most, -1.0);
+        single(most, target + half, bounds.grow, leg);
+    } else {
+        let falls = target <= 0.0 || through_zero;
+        single(a, target - w, if falls { bounds.fall } else { bounds.grow }, leg);
+    }
+}
+
+/// Up from acceleration `a` to at most `bound` and back to none; `gain` is the gain of velocity as if it
+/// began at acceleration 0.
+#[inline(always)]
+fn single(a: f64, gain: f64, bound: f64, mut leg: impl FnMut(f64, f64)) {
+    let peak = sqrt(gain).min(bound);
+    leg(peak - a, 1.0);
+    if peak == bound {
+        leg(gain / bound - bound, 0.0);
+    }
+    leg(peak, -1.0);
 }
 
 /// The velocity that is left when the present acceleration is taken to zero at once.

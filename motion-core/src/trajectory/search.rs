@@ -1,7 +1,8 @@
 //! How far to push when the target is to be passed with a velocity: there is no closed form, but the
 //! way grows with the peak wherever the peak is positive, so that a search between two ends finds it.
 
-use super::ramp::{Bounds, Ramp, resting_velocity};
+use super::profile::SIXTH;
+use super::ramp::{Bounds, change_way, resting_velocity};
 use super::solve::Peak;
 
 /// The peak of the fastest way from a state to `d` ahead with velocity `last`; `d` is more than the
@@ -17,7 +18,7 @@ pub(super) fn peak(v: f64, a: f64, d: f64, last: f64, bounds: &Bounds) -> Peak {
             return Peak::Release(root(a, high, d, way));
         }
     }
-    let way = |u: f64| Ramp::to(v, a, u, bounds).way(v, a) + Ramp::to(u, 0.0, last, bounds).way(u, 0.0);
+    let way = |u: f64| change_way(v, a, u, bounds) + change_way(u, 0.0, last, bounds);
     if d >= way(bounds.velocity) {
         return Peak::Cruise;
     }
@@ -44,7 +45,7 @@ fn highest(mut low: f64, mut high: f64, f: impl Fn(f64) -> f64) -> f64 {
 fn released(v: f64, a: f64, alpha: f64, last: f64, bounds: &Bounds) -> f64 {
     let time = alpha - a;
     let then = v + time * (a + time / 2.0);
-    time * (v + time * (a / 2.0 + time / 6.0)) + Ramp::to(then, alpha, last, bounds).way(then, alpha)
+    time * (v + time * (a / 2.0 + time * SIXTH)) + change_way(then, alpha, last, bounds)
 }
 
 /// Where a growing function reaches `goal`: regula falsi (Illinois), with halvings so that it always

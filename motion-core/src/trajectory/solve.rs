@@ -7,6 +7,7 @@
 //! acceleration; G(u) is the way from velocity u to a stop.
 
 use super::math::{cbrt, sqrt};
+use super::profile::SIXTH;
 use super::ramp::Bounds;
 
 /// How the way to the target is driven, upwards.
@@ -29,7 +30,7 @@ pub(super) fn stopping_way(u: f64, fall: f64) -> f64 {
 /// Way of the immediate stop from a state whose resting velocity is not negative.
 #[inline]
 pub(super) fn stop(v: f64, a: f64, fall: f64) -> f64 {
-    v * a + a * a * a / 3.0 + stopping_way(v + a * a / 2.0, fall)
+    v * a + a * a * a * (2.0 * SIXTH) + stopping_way(v + a * a / 2.0, fall)
 }
 
 /// The peak of the fastest way from a state to a standstill `d` ahead; `d` is more than the way of
@@ -37,7 +38,7 @@ pub(super) fn stop(v: f64, a: f64, fall: f64) -> f64 {
 #[inline]
 pub(super) fn peak(v: f64, a: f64, d: f64, bounds: &Bounds) -> Peak {
     let w = v - a * a / 2.0;
-    let k = d + w * a + a * a * a / 6.0;
+    let k = d + w * a + a * a * a * SIXTH;
     if !bounds.crosses(v, a, w) {
         return push(w, a, k, bounds.grow, bounds.velocity, bounds);
     }
@@ -56,8 +57,8 @@ pub(super) fn peak(v: f64, a: f64, d: f64, bounds: &Bounds) -> Peak {
     }
     // From (velocity 0, acceleration `most`) it is a push along w = −most²/2. The way to there is that
     // to the peak `half`, less what the jerk −1 still adds from `most` to 0, less the stop.
-    let there = way - stopping_way(half, bounds.fall) - most * most * most / 3.0;
-    let k = k - there - half * most + most * most * most / 6.0;
+    let there = way - stopping_way(half, bounds.fall) - most * most * most * (2.0 * SIXTH);
+    let k = k - there - half * most + most * most * most * SIXTH;
     push(-half, most, k, bounds.grow, bounds.velocity, bounds)
 }
 

@@ -2,7 +2,7 @@
 
 use super::limits::Limits;
 use super::math::sqrt;
-use super::plan::{ROUNDING, TOUCH, push};
+use super::plan::{ROUNDING, TOUCH};
 use super::profile::{Phase, Profile, State};
 
 impl Profile {
@@ -69,7 +69,10 @@ impl Profile {
                 acceleration,
                 jerk: 0.0,
             };
-            push(self, phase);
+            if let Some(slot) = self.phases.get_mut(self.len) {
+                *slot = phase;
+                self.len += 1;
+            }
             self.duration += time;
             *at = phase.after(time);
         }
