@@ -117,6 +117,12 @@ fn planning(moving: bool, symmetric: bool, rounds: usize, smoke: bool, bar: f64)
         .map(|plan| (*plan, for_peer(plan)))
         .filter(|(_, input)| solves(peer.calculate(input, &mut trajectory)))
         .collect();
+    #[cfg(feature = "ruckig")]
+    let mut cpp: (Vec<_>, _, _) = (
+        solved.iter().map(|(plan, _)| for_ruckig(plan)).collect(),
+        ruckig::Ruckig::new_direct(1, CYCLE),
+        ruckig::Trajectory::new_direct(1),
+    );
     let mut profile = Profile::at_rest(0.0);
     let mut contenders = vec![
         Contender::new("ours", || {
@@ -131,12 +137,6 @@ fn planning(moving: bool, symmetric: bool, rounds: usize, smoke: bool, bar: f64)
             }
         }),
     ];
-    #[cfg(feature = "ruckig")]
-    let mut cpp: (Vec<_>, _, _) = (
-        solved.iter().map(|(plan, _)| for_ruckig(plan)).collect(),
-        ruckig::Ruckig::new_direct(1, CYCLE),
-        ruckig::Trajectory::new_direct(1),
-    );
     #[cfg(feature = "ruckig")]
     contenders.push(Contender::new("ruckig", || {
         for input in &mut cpp.0 {

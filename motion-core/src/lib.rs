@@ -8,6 +8,7 @@ extern crate alloc;
 extern crate std;
 
 pub mod application;
+mod axis;
 pub mod bus;
 pub mod control;
 mod controller;
@@ -20,4 +21,5 @@ pub mod parameters;
 pub mod storage;
 pub mod trajectory;
 
+pub use axis::Axis;
 pub use controller::{AXES, Controller, Model, OS_VERSION, Reset, ResetError, STORAGE_LEN};

@@ -150,7 +150,7 @@ impl AxisAccess {
         }
         match (self.status.state, &order) {
             (State::Disabled, _) => return Err(MotionError::NOT_ENABLED),
-            (State::ErrorStop, _) if self.status.error.0 != 0 && !self.retreats() => {
+            (State::ErrorStop, _) if self.status.error.0 != 0 && !self.status.error.is_limit() => {
                 return Err(MotionError::IN_ERROR);
             }
             (_, Order::Stop) => self.held = true,
@@ -160,17 +160,6 @@ impl AxisAccess {
         self.last = self.last.wrapping_add(1);
         self.waiting = Some((self.last, order));
         Ok(Ticket(self.last))
-    }
-
-    /// Whether the failure is a limit switch, off which the axis may still move (6.8.1.1).
-    const fn retreats(&self) -> bool {
-        matches!(
-            self.status.error,
-            MotionError::SW_LIMIT_PLUS
-                | MotionError::SW_LIMIT_MINUS
-                | MotionError::HW_LIMIT_PLUS
-                | MotionError::HW_LIMIT_MINUS
-        )
     }
 
     /// How far an order is.

@@ -44,6 +44,24 @@ impl MotionError {
         Self(failure.0 as u16)
     }
 
+    /// Whether it is a limit switch, off which the axis may still move (6.8.1.1).
+    #[must_use]
+    pub const fn is_limit(self) -> bool {
+        matches!(
+            self,
+            Self::SW_LIMIT_PLUS | Self::SW_LIMIT_MINUS | Self::HW_LIMIT_PLUS | Self::HW_LIMIT_MINUS
+        )
+    }
+
+    /// The failure that it is; `None` for no error and for a refusal.
+    #[must_use]
+    pub const fn failure(self) -> Option<Failure> {
+        match self.0 {
+            number @ 1..=0xFF => Some(Failure(number as u8)),
+            _ => None,
+        }
+    }
+
     /// What it means; `None` for an unknown number.
     #[must_use]
     pub fn text(self) -> Option<&'static str> {

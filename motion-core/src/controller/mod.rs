@@ -12,8 +12,9 @@ use lb2::code::{Failure, StoredFailure, Version};
 use lb2::telegram::{BANK_LEN, MAX_FAILURES};
 
 use crate::application::{Application, AxisAccess, AxisStatus};
+use crate::axis::Axis;
 use crate::bus::CanBus;
-use crate::control::{Control, DriveInputs, Unmoved as Axis};
+use crate::control::{Control, DriveInputs};
 use crate::failure::FailureLog;
 use crate::input::ActualValue;
 use crate::io::{FieldBus, Inputs, Outputs};

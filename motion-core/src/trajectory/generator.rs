@@ -121,6 +121,25 @@ impl Generator {
         Ok(())
     }
 
+    /// Another goal within other limits, from here.
+    ///
+    /// # Errors
+    /// [`PlanError`]: the goal is out of range; the old one stays, and the old limits.
+    pub fn go(&mut self, goal: Goal, limits: Limits) -> Result<(), PlanError> {
+        self.plan(goal, &limits)?;
+        (self.goal, self.limits) = (goal, limits);
+        Ok(())
+    }
+
+    /// Moves the scale of positions: state, way and goal, by `distance`, units.
+    pub fn shift(&mut self, distance: f64) {
+        self.profile.shift(distance);
+        self.state.position += distance;
+        if let Goal::Position(target) = &mut self.goal {
+            *target += distance;
+        }
+    }
+
     /// Sets the state of motion, as when control takes over a moving axis, and stops from there.
     ///
     /// # Errors

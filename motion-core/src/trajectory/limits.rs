@@ -43,6 +43,10 @@ const MIN_LIMIT: f64 = 1e-12;
 const MAX_LIMIT: f64 = 1e18;
 
 impl Limits {
+    /// One of everything, without a limit of jerk.
+    pub(crate) const UNIT: Self =
+        Self { velocity: 1.0, acceleration: 1.0, deceleration: 1.0, jerk: f64::INFINITY };
+
     /// Limits in units/s, units/s² (while the speed grows, while it falls) and units/s³. A jerk of
     /// [`f64::INFINITY`] makes trapezoids.
     ///

@@ -48,7 +48,7 @@ impl Drive<'_> {
     }
 
     fn end(&mut self) {
-        self.profile.len = self.len;
+        self.profile.len = self.len as u8;
         self.profile.duration = self.time;
     }
 
@@ -66,7 +66,7 @@ impl Drive<'_> {
                 self.time += time;
             }
         }
-        self.profile.tail = self.len;
+        self.profile.tail = self.len as u8;
     }
 
     /// The stop at the target, from velocity `u` without acceleration, or from where the jerk −1 that
@@ -214,7 +214,7 @@ impl Profile {
 
     /// Way until the velocity first changes its sign; `None` if it does not before the peak.
     fn first_turn(&self) -> Option<f64> {
-        let phases = self.phases().get(..self.tail.min(self.len))?;
+        let phases = self.phases().get(..usize::from(self.tail.min(self.len)))?;
         phases.windows(2).find_map(|pair| {
             let [phase, next] = pair else { return None };
             let root = sqrt(phase.acceleration * phase.acceleration - 2.0 * phase.jerk * phase.velocity);

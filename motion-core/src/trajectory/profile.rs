@@ -92,9 +92,9 @@ pub enum PlanError {
 #[derive(Debug, Clone)]
 pub struct Profile {
     pub(super) phases: [Phase; MAX_PHASES],
-    pub(super) len: usize,
+    pub(super) len: u8,
     /// First phase whose position counts from the target.
-    pub(super) tail: usize,
+    pub(super) tail: u8,
     pub(super) start: f64,
     pub(super) end: State,
     pub(super) duration: f64,
@@ -175,9 +175,14 @@ impl Profile {
         self.reach(from, limits, 0.0)
     }
 
+    pub(super) fn shift(&mut self, distance: f64) {
+        self.start += distance;
+        self.end.position += distance;
+    }
+
     fn begin(&mut self, from: &State) {
         self.len = 0;
-        self.tail = MAX_PHASES;
+        self.tail = MAX_PHASES as u8;
         self.start = from.position;
         self.duration = 0.0;
         self.overshoots = false;
@@ -214,13 +219,13 @@ impl Profile {
     /// The stretches of constant jerk, in order.
     #[must_use]
     pub fn phases(&self) -> &[Phase] {
-        self.phases.get(..self.len).unwrap_or(&[])
+        self.phases.get(..usize::from(self.len)).unwrap_or(&[])
     }
 
     /// What a phase's positions count from: the start, or after the peak the target.
     #[must_use]
     pub fn origin(&self, phase: usize) -> f64 {
-        if phase < self.tail { self.start } else { self.end.position }
+        if phase < usize::from(self.tail) { self.start } else { self.end.position }
     }
 
     /// The state at a time, s after the start. Before the start it is that of the start; after the

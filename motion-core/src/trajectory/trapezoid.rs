@@ -69,7 +69,7 @@ impl Profile {
                 acceleration,
                 jerk: 0.0,
             };
-            if let Some(slot) = self.phases.get_mut(self.len) {
+            if let Some(slot) = self.phases.get_mut(usize::from(self.len)) {
                 *slot = phase;
                 self.len += 1;
             }

@@ -38,7 +38,9 @@ fn class(scale: f64, from_rest: bool, symmetric: bool, passing: bool) {
         scale as u128 * 8 + u128::from(from_rest) * 4 + u128::from(symmetric) * 2 + u128::from(passing);
     let mut random = Rand64::new(seed);
     let (mut most, mut latest) = (0.0_f64, 0.0_f64);
-    for _ in 0..count() {
+    // The slow solver is at its slowest where the target is passed.
+    let count = if passing { count() / 5 } else { count() };
+    for _ in 0..count {
         let limits = limits(&mut random, scale, symmetric, true);
         let position = (between(&mut random, -1e3, 1e3) * scale).round();
         let from = if from_rest { State::at_rest(position) } else { moving(&mut random, &limits, position) };
@@ -52,7 +54,7 @@ fn class(scale: f64, from_rest: bool, symmetric: bool, passing: bool) {
         if from_rest { "from rest" } else { "moving" },
         if symmetric { "symmetric" } else { "asymmetric" },
         if passing { ", passing the target" } else { "" },
-        count(),
+        count,
     );
 }
 
