@@ -63,17 +63,3 @@ pub trait AxisControl {
     /// One cycle.
     fn cycle(&mut self, input: &AxisInput) -> AxisOutput;
 }
-
-/// An axis that only shows where it is.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Unmoved;
-
-impl AxisControl for Unmoved {
-    fn configure(&mut self, _values: &Values, _at: usize, _cycle: u16) {}
-
-    fn cycle(&mut self, input: &AxisInput) -> AxisOutput {
-        let ActualValue { position, velocity, .. } = input.actual;
-        let status = AxisStatus { position, velocity, nominal_position: position, ..AxisStatus::default() };
-        AxisOutput { status, ..AxisOutput::default() }
-    }
-}

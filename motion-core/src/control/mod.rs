@@ -4,7 +4,7 @@
 mod axis;
 mod settings;
 
-pub use axis::{AxisControl, AxisInput, AxisOutput, PlcStop, Unmoved};
+pub use axis::{AxisControl, AxisInput, AxisOutput, PlcStop};
 
 use lb2::code::{Failure, StoredFailure};
 
