@@ -20,6 +20,17 @@ pub trait Port: Send {
     fn send(&mut self, bytes: &[u8]) -> io::Result<()>;
 }
 
+/// A time limit for the kernel's `poll`, which takes no endless ones.
+#[cfg(unix)]
+pub(crate) fn poll_limit(timeout: Duration) -> rustix::event::Timespec {
+    const LONGEST: Duration = Duration::from_secs(3600);
+    let timeout = timeout.min(LONGEST);
+    rustix::event::Timespec {
+        tv_sec: timeout.as_secs().cast_signed(),
+        tv_nsec: timeout.subsec_nanos().into(),
+    }
+}
+
 /// Which side of the line to be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {

@@ -11,7 +11,7 @@ use rustix::fs::{Mode, OFlags};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 
-use crate::port::Port;
+use crate::port::{Port, poll_limit};
 
 /// So long bytes wait for a reader before they are given up.
 const UNREAD: rustix::event::Timespec = rustix::event::Timespec { tv_sec: 1, tv_nsec: 0 };
@@ -70,8 +70,7 @@ impl Drop for Pty {
 impl Port for Pty {
     fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<usize> {
         let mut ready = [PollFd::new(&self.end, PollFlags::IN)];
-        let limit = rustix::event::Timespec::try_from(timeout).map_err(io::Error::other)?;
-        match poll(&mut ready, Some(&limit)) {
+        match poll(&mut ready, Some(&poll_limit(timeout))) {
             Ok(0) | Err(rustix::io::Errno::INTR) => Ok(0),
             Ok(_) => self.end.read(buffer),
             Err(error) => Err(error.into()),

@@ -9,6 +9,9 @@ use serialport::{DataBits, FlowControl, SerialPort, StopBits};
 use crate::endpoint::{Endpoint, Parity, Settings};
 use crate::port::{OpenError, Port};
 
+/// The system takes no endless time limits.
+const LONGEST: Duration = Duration::from_secs(3600);
+
 struct Serial(Box<dyn SerialPort>);
 
 pub(crate) fn open(endpoint: &Endpoint, path: &str, settings: &Settings) -> Result<Box<dyn Port>, OpenError> {
@@ -63,7 +66,7 @@ fn failed(endpoint: &Endpoint, path: &str, error: serialport::Error) -> OpenErro
 
 impl Port for Serial {
     fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<usize> {
-        self.0.set_timeout(timeout).map_err(io::Error::from)?;
+        self.0.set_timeout(timeout.min(LONGEST)).map_err(io::Error::from)?;
         match self.0.read(buffer) {
             // The system says "end of file" for a line that is gone, "timed out" for a silent one.
             Ok(0) => Err(io::Error::new(io::ErrorKind::BrokenPipe, "the port is gone")),

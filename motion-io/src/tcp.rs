@@ -38,8 +38,8 @@ pub(crate) fn open(endpoint: &Endpoint, address: &str, role: Role) -> Result<Box
 #[cfg(unix)]
 fn readable(stream: &TcpStream, timeout: Duration) -> io::Result<bool> {
     // The socket's own time limit is rounded up to the kernel's ticks, several milliseconds.
-    use rustix::event::{PollFd, PollFlags, Timespec, poll};
-    let limit = Timespec::try_from(timeout).map_err(io::Error::other)?;
+    use rustix::event::{PollFd, PollFlags, poll};
+    let limit = crate::port::poll_limit(timeout);
     match poll(&mut [PollFd::new(stream, PollFlags::IN)], Some(&limit)) {
         Ok(ready) => Ok(ready > 0),
         Err(rustix::io::Errno::INTR) => Ok(false),

@@ -60,6 +60,11 @@ pub(crate) enum Command {
         #[command(subcommand)]
         command: Sim,
     },
+    /// Work on a CANopen bus
+    Can {
+        #[command(subcommand)]
+        command: crate::can::cli::Can,
+    },
     /// Virtual CAN buses for other programs, over the socketcand protocol, until stopped
     Bus(crate::can::cli::Bus),
     /// Serial ports found
@@ -111,6 +116,12 @@ pub(crate) enum Sim {
     },
     /// A virtual LinMot drive behind CANopen or LinRS
     Linmot(crate::linmot::cli::SimLinmot),
+    /// A virtual LD 2000 servo drive on a CAN bus
+    Drive(crate::can::cli::SimNode),
+    /// A virtual DS401 I/O node: 8 digital and 4 analogue inputs and outputs
+    Io(crate::can::cli::SimIo),
+    /// A virtual node with the objects of a device file
+    Node(crate::can::cli::SimFile),
 }
 
 #[derive(Debug, Clone, Args)]

@@ -13,8 +13,17 @@ use crate::output::Output;
 /// Reads are repeated so often.
 const RETRIES: u8 = 2;
 
-/// What `--port`, the environment or the configuration names.
-pub(crate) fn endpoint(global: &Global, line: &Line) -> Result<Endpoint, Exit> {
+/// Which kind of endpoint a command needs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum ChoiceOf {
+    /// `--port`, MOTIONCTL_PORT, `port`.
+    Port,
+    /// `--can`, MOTIONCTL_CAN, `can`.
+    Can,
+}
+
+/// What the command line, the environment or the configuration names, as an endpoint's text.
+pub(crate) fn choose(global: &Global, given: Option<&str>, what: ChoiceOf) -> Result<String, Exit> {
     let config = match &global.config {
         Some(path) => {
             let name = path.display().to_string();
@@ -23,13 +32,23 @@ pub(crate) fn endpoint(global: &Global, line: &Line) -> Result<Endpoint, Exit> {
         }
         None => toml_edit::DocumentMut::new(),
     };
-    let default = config.get("port").and_then(|item| item.as_str());
-    let written = line.port.as_deref().or(default).ok_or_else(|| {
-        Exit::usage("no port: --port EP, MOTIONCTL_PORT or `port` in the configuration file expected")
-    })?;
+    let (key, missing) = match what {
+        ChoiceOf::Port => {
+            ("port", "no port: --port EP, MOTIONCTL_PORT or `port` in the configuration file expected")
+        }
+        ChoiceOf::Can => {
+            ("can", "no CAN endpoint: --can EP, MOTIONCTL_CAN or `can` in the configuration file expected")
+        }
+    };
+    let default = config.get(key).and_then(|item| item.as_str());
+    let written = given.or(default).ok_or_else(|| Exit::usage(missing))?;
     let named = config.get("endpoints").and_then(|table| table.get(written)).and_then(|item| item.as_str());
-    named
-        .unwrap_or(written)
+    Ok(named.unwrap_or(written).to_owned())
+}
+
+/// The serial endpoint that `--port`, the environment or the configuration names.
+pub(crate) fn endpoint(global: &Global, line: &Line) -> Result<Endpoint, Exit> {
+    choose(global, line.port.as_deref(), ChoiceOf::Port)?
         .parse()
         .map_err(|error: motion_io::endpoint::EndpointError| Exit::usage(error.to_string()))
 }

@@ -33,7 +33,8 @@ fn main() -> ExitCode {
     let done = match cli.command {
         Command::Demo => demo::run(&out),
         Command::Run(arguments) => run::run(&out, &arguments),
-        Command::Sim { command } => sim::run(&out, &command),
+        Command::Sim { command } => sim::run(&out, &cli.global, &command),
+        Command::Can { command } => can::run(&out, &cli.global, &command),
         Command::Bus(arguments) => can::bus::run(&out, &arguments),
         Command::Ports => ports(&out),
         Command::Lb2 { command } => lb2::run(&out, &cli.global, &command),

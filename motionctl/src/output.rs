@@ -49,6 +49,12 @@ impl Output {
         let _ = std::io::stdout().flush();
     }
 
+    /// A line of a stream: one JSON object, or what `text` says.
+    pub(crate) fn line(&self, document: Value, text: impl FnOnce() -> String) {
+        self.document(document, || println!("{}", text()));
+        let _ = std::io::stdout().flush();
+    }
+
     /// A line about what happens, for people.
     pub(crate) fn say(&self, text: &str) {
         if !self.json && !self.quiet {

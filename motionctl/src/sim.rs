@@ -12,15 +12,18 @@ use motion_io::lb2::serve;
 use motion_io::port::{Role, open};
 use serde_json::json;
 
-use crate::can::stop_flag;
-use crate::cli::Sim;
+use crate::can::{self, stop_flag};
+use crate::cli::{Global, Sim};
 use crate::exit::Exit;
 use crate::output::Output;
 use crate::storage::FileStorage;
 
-pub(crate) fn run(out: &Output, command: &Sim) -> Result<(), Exit> {
+pub(crate) fn run(out: &Output, global: &Global, command: &Sim) -> Result<(), Exit> {
     let (model, serial, state, device) = match command {
         Sim::Controller { model, serial, state, device } => (model, serial, state, device),
+        Sim::Drive(arguments) => return can::sim::drive(out, global, arguments),
+        Sim::Io(arguments) => return can::sim::io(out, global, arguments),
+        Sim::Node(arguments) => return can::sim::file(out, global, arguments),
         Sim::Linmot(arguments) => return crate::linmot::sim::run(out, arguments),
     };
     let model = Model::from_number(*model)

@@ -6,6 +6,8 @@ use std::time::Instant;
 
 use pdo::Frame;
 
+#[cfg(feature = "virtual")]
+use super::BusState;
 use super::{BusEvent, CanPort, Event};
 
 /// What drives an engine: frames and time in, frames out. Engines have methods of these names.
@@ -18,6 +20,8 @@ pub trait Engine {
     fn poll_transmit(&mut self, now: Duration) -> Option<Frame>;
     /// When to call [`handle_timeout`](Self::handle_timeout); `None` = idle.
     fn poll_timeout(&self) -> Option<Duration>;
+    /// What the endpoint tells about its bus.
+    fn handle_bus(&mut self, _now: Duration, _event: BusEvent) {}
 }
 
 #[cfg(feature = "virtual")]
@@ -36,6 +40,19 @@ impl<N: device_sim::can::Node> Engine for N {
 
     fn poll_timeout(&self) -> Option<Duration> {
         device_sim::can::Node::poll_timeout(self)
+    }
+
+    fn handle_bus(&mut self, now: Duration, event: BusEvent) {
+        use device_sim::can::{Event, State};
+        if let BusEvent::State(state) = event {
+            let state = match state {
+                BusState::Active => State::Active,
+                BusState::Warning => State::Warning,
+                BusState::Passive => State::Passive,
+                BusState::Off => State::BusOff,
+            };
+            device_sim::can::Node::handle_bus(self, now, Event::State(state));
+        }
     }
 }
 
@@ -84,9 +101,13 @@ impl Driver {
         mut observe: impl FnMut(Duration, Event, bool),
     ) -> io::Result<()> {
         let now = self.now();
+        let mut sent = false;
         while let Some(frame) = self.held.take().or_else(|| engine.poll_transmit(now)) {
             match self.port.send(&frame) {
-                Ok(()) => observe(now, Event::Frame(frame), true),
+                Ok(()) => {
+                    sent = true;
+                    observe(now, Event::Frame(frame), true);
+                }
                 Err(error)
                     if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::NetworkDown) =>
                 {
@@ -101,12 +122,14 @@ impl Driver {
         if self.held.is_some() {
             until = until.min(now.saturating_add(RETRY));
         }
-        let mut timeout = until.saturating_sub(now);
+        // What was sent may have ended something, which the caller wants to know before waiting.
+        let mut timeout = if sent { Duration::ZERO } else { until.saturating_sub(now) };
         for _ in 0..BATCH {
             let Some(event) = self.port.receive(timeout)? else { break };
             let now = self.now();
-            if let Event::Frame(frame) = &event {
-                engine.handle_frame(now, frame);
+            match &event {
+                Event::Frame(frame) => engine.handle_frame(now, frame),
+                Event::Bus(event) => engine.handle_bus(now, *event),
             }
             observe(now, event, false);
             timeout = Duration::ZERO;

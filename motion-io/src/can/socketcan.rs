@@ -7,13 +7,13 @@ use std::os::fd::AsFd;
 use std::time::Instant;
 
 use pdo::Frame;
-use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::event::{PollFd, PollFlags, poll};
 use socketcan::errors::{ControllerProblems, ErrorCause};
 use socketcan::{CanError, CanFrame, CanSocket, Socket, SocketOptions};
 
 use super::{BusError, BusEvent, BusState, CanPort, Event};
 use crate::endpoint::CanEndpoint;
-use crate::port::OpenError;
+use crate::port::{OpenError, poll_limit};
 
 struct Port {
     socket: CanSocket,
@@ -65,7 +65,7 @@ impl CanPort for Port {
             if left.is_zero() {
                 return Ok(None);
             }
-            let limit = Timespec::try_from(left).map_err(io::Error::other)?;
+            let limit = poll_limit(left);
             let mut ready = [PollFd::from_borrowed_fd(self.socket.as_fd(), PollFlags::IN)];
             match poll(&mut ready, Some(&limit)) {
                 Ok(_) | Err(rustix::io::Errno::INTR) => {}

@@ -6,13 +6,18 @@ use std::io;
 use std::sync::{Arc, Condvar, LazyLock, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::Instant;
 
-use device_sim::can::{Bus, ErrorKind, Event as StationEvent, Faults, State, StationId, TransmitError};
+use device_sim::can::{
+    Bus, ErrorKind, Event as StationEvent, Faults, QUEUE, State, StationId, TransmitError,
+};
 use pdo::Frame;
 
 use super::{BusError, BusEvent, BusState, CanPort, Event};
 
 /// Bits per second unless set (project-defined).
 const BIT_RATE: u32 = 500_000;
+
+/// The system takes no endless time limits.
+const LONGEST: Duration = Duration::from_secs(3600);
 
 /// Buses that `virtual:NAME` endpoints share, as long as somebody holds them.
 static NAMED: LazyLock<Mutex<HashMap<String, Weak<Shared>>>> = LazyLock::new(Mutex::default);
@@ -119,6 +124,23 @@ impl VirtualPort {
     }
 }
 
+impl VirtualPort {
+    /// Waits until everything that was sent is on the wire, at most `timeout`.
+    pub(super) fn drain(&self, timeout: Duration) {
+        let shared = &self.0.shared;
+        let end = shared.start.elapsed().saturating_add(timeout);
+        let mut wire = shared.lock();
+        loop {
+            shared.advance(&mut wire);
+            let now = shared.start.elapsed();
+            let empty = wire.bus.room(self.0.station) == QUEUE;
+            let Some(next) = wire.bus.poll_timeout().filter(|_| !empty && now < end) else { return };
+            let left = next.min(end).saturating_sub(now);
+            wire = shared.changed.wait_timeout(wire, left).unwrap_or_else(PoisonError::into_inner).0;
+        }
+    }
+}
+
 impl CanPort for VirtualPort {
     fn send(&mut self, frame: &Frame) -> io::Result<()> {
         let shared = &self.0.shared;
@@ -151,7 +173,7 @@ impl CanPort for VirtualPort {
                 return Ok(None);
             }
             let until = wire.bus.poll_timeout().map_or(end, |at| at.min(end));
-            let left = until.saturating_sub(now);
+            let left = until.saturating_sub(now).min(LONGEST);
             wire = shared.changed.wait_timeout(wire, left).unwrap_or_else(PoisonError::into_inner).0;
         }
     }

@@ -1,12 +1,38 @@
-//! `motionctl can …`, `motionctl bus`: work on a CANopen bus.
+//! `motionctl can …`, `motionctl bus`, and virtual nodes: work on a CANopen bus.
 
 pub(crate) mod bus;
 pub(crate) mod cli;
+mod lss;
+mod network;
+mod pdo;
+mod sdo;
+pub(crate) mod session;
+pub(crate) mod sim;
+mod value;
 
 use core::sync::atomic::{AtomicBool, Ordering};
 use std::sync::Arc;
 
+use crate::cli::Global;
 use crate::exit::Exit;
+use crate::output::Output;
+use cli::Can;
+
+pub(crate) fn run(out: &Output, global: &Global, command: &Can) -> Result<(), Exit> {
+    match command {
+        Can::Scan { line, nodes } => network::scan(out, global, line, nodes.as_deref()),
+        Can::Nmt { command, node, line } => network::nmt(out, global, line, *command, node),
+        Can::Guard { nodes, line, period, life, stream } => {
+            network::guard(out, global, line, nodes, (*period, *life), stream)
+        }
+        Can::Sdo { command } => sdo::run(out, global, command),
+        Can::Pdo { command } => pdo::run(out, global, command),
+        Can::Lss { command } => lss::run(out, global, command),
+        Can::Dcf { node, file, line } => pdo::dcf(out, global, line, *node, file),
+        Can::Emcy { line, stream } => network::emcy(out, global, line, stream),
+        Can::Monitor { line, stream } => network::monitor(out, global, line, stream),
+    }
+}
 
 /// Set by a signal that asks the program to stop.
 pub(crate) fn stop_flag() -> Result<Arc<AtomicBool>, Exit> {

@@ -93,9 +93,15 @@ impl Session {
         };
         session.say("< hi >")?;
         std::thread::scope(|scope| {
+            let mut station = None;
             let done = session.read(buses, stop, |port| {
+                station = Some(port.clone());
                 scope.spawn(|| session.forward(port));
             });
+            // What a client sent before it left still goes out.
+            if let Some(port) = station {
+                port.drain(WRITE);
+            }
             session.ended.store(true, Ordering::Relaxed);
             done
         })

@@ -1,0 +1,225 @@
+//! `motionctl can pdo …`, `can dcf`: how a node is set up.
+
+use std::path::Path;
+
+use canopen_master::eds::{self, ConciseEntry};
+use canopen_master::{Address, NodeId};
+use serde_json::{Value, json};
+
+use super::cli::{CanLine, Pdo};
+use super::sdo::tell;
+use super::session::{Session, node_id};
+use super::value::{hex, number};
+use crate::cli::Global;
+use crate::exit::Exit;
+use crate::output::Output;
+
+/// Bit 31 of a COB-ID: the PDO is off.
+const OFF: u32 = 1 << 31;
+
+/// A PDO's objects.
+#[derive(Debug, Clone, Copy)]
+struct Place {
+    communication: u16,
+    mapping: u16,
+    transmit: bool,
+}
+
+fn place(text: &str) -> Result<Place, Exit> {
+    let wrong = || Exit::usage(format!("{text:?}: tpdo1 to tpdo512 or rpdo1 to rpdo512 expected"));
+    let lower = text.to_ascii_lowercase();
+    let (base, digits, transmit) = match (lower.strip_prefix("tpdo"), lower.strip_prefix("rpdo")) {
+        (Some(digits), _) => (0x1800, digits, true),
+        (_, Some(digits)) => (0x1400, digits, false),
+        _ => return Err(wrong()),
+    };
+    let number: u16 = digits.parse().ok().filter(|number| (1..=512).contains(number)).ok_or_else(wrong)?;
+    let communication = base + number - 1;
+    Ok(Place { communication, mapping: communication + 0x200, transmit })
+}
+
+struct Access<'a> {
+    out: &'a Output,
+    session: Session,
+    node: NodeId,
+}
+
+impl Access<'_> {
+    fn read(&mut self, index: u16, sub: u8) -> Result<u32, Exit> {
+        let read = self.session.upload(self.node, Address::new(index, sub), false)?;
+        let (data, _) = read.map_err(|error| tell(self.out, error))?;
+        Ok(data.iter().take(4).rev().fold(0, |value, byte| value << 8 | u32::from(*byte)))
+    }
+
+    /// An object that a device need not have.
+    fn read_optional(&mut self, index: u16, sub: u8) -> Result<Option<u32>, Exit> {
+        match self.session.upload(self.node, Address::new(index, sub), false)? {
+            Ok((data, _)) => {
+                Ok(Some(data.iter().take(4).rev().fold(0, |value, byte| value << 8 | u32::from(*byte))))
+            }
+            Err(error) if matches!(error.outcome, canopen_master::sdo::Outcome::Aborted(_)) => Ok(None),
+            Err(error) => Err(tell(self.out, error)),
+        }
+    }
+
+    fn write(&mut self, index: u16, sub: u8, data: &[u8], what: &str) -> Result<(), Exit> {
+        let written = self.session.download(self.node, Address::new(index, sub), data.to_vec(), false)?;
+        written.map(|_| ()).map_err(|error| tell(self.out, error).context(what))
+    }
+}
+
+pub(crate) fn run(out: &Output, global: &Global, command: &Pdo) -> Result<(), Exit> {
+    match command {
+        Pdo::Read { node, pdo, line } => {
+            let place = place(pdo)?;
+            let session = Session::open(global, line)?;
+            let mut access = Access { out, session, node: node_id(*node)? };
+            let document = read(&mut access, pdo, place)?;
+            out.document(document.clone(), || print(&document));
+            Ok(())
+        }
+        Pdo::Write { node, pdo, line, map, id, transmission, inhibit, event, off } => {
+            let place = place(pdo)?;
+            let map =
+                map.as_ref().map(|map| map.iter().map(|text| entry(text)).collect::<Result<Vec<_>, _>>());
+            let map = map.transpose()?;
+            let id = id.as_deref().map(identifier).transpose()?;
+            if global.dry_run {
+                out.say(&format!("would set {pdo} of node {node} up"));
+                return Ok(());
+            }
+            let session = Session::open(global, line)?;
+            let mut access = Access { out, session, node: node_id(*node)? };
+            let cob = access.read(place.communication, 1)?;
+            let cob = id.map_or(cob, |id| cob & !0x1FFF_FFFF | id);
+            // CiA 301, 7.5.2.38: off, count 0, entries, count, on.
+            access.write(place.communication, 1, &(cob | OFF).to_le_bytes(), "switching the PDO off")?;
+            if let Some(number) = transmission {
+                access.write(place.communication, 2, &[*number], "transmission type")?;
+            }
+            if let Some(time) = inhibit {
+                access.write(place.communication, 3, &time.to_le_bytes(), "inhibit time")?;
+            }
+            if let Some(time) = event {
+                access.write(place.communication, 5, &time.to_le_bytes(), "event timer")?;
+            }
+            if let Some(map) = &map {
+                access.write(place.mapping, 0, &[0], "number of mapped objects")?;
+                for (entry, sub) in map.iter().zip(1..) {
+                    access.write(
+                        place.mapping,
+                        sub,
+                        &entry.to_le_bytes(),
+                        &format!("mapped object {sub}"),
+                    )?;
+                }
+                access.write(place.mapping, 0, &[map.len() as u8], "number of mapped objects")?;
+            }
+            if !off {
+                access.write(place.communication, 1, &(cob & !OFF).to_le_bytes(), "switching the PDO on")?;
+            }
+            let document = read(&mut access, pdo, place)?;
+            out.document(document.clone(), || print(&document));
+            Ok(())
+        }
+    }
+}
+
+fn read(access: &mut Access<'_>, pdo: &str, place: Place) -> Result<Value, Exit> {
+    let cob = access.read(place.communication, 1)?;
+    let transmission = access.read(place.communication, 2)?;
+    let inhibit = access.read_optional(place.communication, 3)?;
+    let event = access.read_optional(place.communication, 5)?;
+    let start = if place.transmit { access.read_optional(place.communication, 6)? } else { None };
+    let count = access.read(place.mapping, 0)?;
+    let mut mapping = Vec::new();
+    for sub in 1..=count.min(64) as u8 {
+        let raw = access.read(place.mapping, sub)?;
+        mapping.push(json!({ "index": raw >> 16, "subindex": raw >> 8 & 0xFF, "bits": raw & 0xFF }));
+    }
+    Ok(json!({
+        "node": access.node.raw(),
+        "pdo": pdo,
+        "id": cob & 0x1FFF_FFFF,
+        "enabled": cob & OFF == 0,
+        "rtr": cob & 1 << 30 == 0,
+        "transmission": transmission,
+        "inhibit": inhibit,
+        "event": event,
+        "sync_start": start,
+        "mapping": mapping,
+    }))
+}
+
+fn print(document: &Value) {
+    let number = |key: &str| document[key].as_u64().map_or("-".into(), |number| number.to_string());
+    let enabled = if document["enabled"] == true { "" } else { ", off" };
+    println!(
+        "{} of node {}: identifier {:03X}h{enabled}, transmission type {}, inhibit time {} x 100 µs, event timer {} ms",
+        document["pdo"].as_str().unwrap_or(""),
+        document["node"],
+        document["id"].as_u64().unwrap_or(0),
+        document["transmission"],
+        number("inhibit"),
+        number("event"),
+    );
+    for entry in document["mapping"].as_array().into_iter().flatten() {
+        let number = |key: &str| entry[key].as_u64().unwrap_or(0);
+        println!("  {:04X}h:{:02X}  {} bits", number("index"), number("subindex"), number("bits"));
+    }
+}
+
+/// `0x6041:0:16`.
+fn entry(text: &str) -> Result<u32, Exit> {
+    let wrong = || Exit::usage(format!("--map {text:?}: INDEX:SUB:BITS such as 0x6041:0:16 expected"));
+    let parts: Option<Vec<i128>> = text.split(':').map(number).collect();
+    match parts.as_deref() {
+        Some(&[index @ 0..=0xFFFF, sub @ 0..=0xFF, bits @ 1..=64]) => {
+            Ok((index as u32) << 16 | (sub as u32) << 8 | bits as u32)
+        }
+        _ => Err(wrong()),
+    }
+}
+
+fn identifier(text: &str) -> Result<u32, Exit> {
+    let known = number(text).and_then(|id| u32::try_from(id).ok()).filter(|id| (1..=0x7FF).contains(id));
+    known.ok_or_else(|| Exit::usage(format!("--id {text:?}: 0x001 to 0x7FF expected")))
+}
+
+/// `motionctl can dcf NODE FILE`.
+pub(crate) fn dcf(out: &Output, global: &Global, line: &CanLine, node: u8, file: &Path) -> Result<(), Exit> {
+    let name = file.display().to_string();
+    let bytes = std::fs::read(file).map_err(|error| Exit::file(&name, &error))?;
+    let entries = entries(&bytes, node).map_err(|error| Exit::file(&name, &error))?;
+    if global.dry_run {
+        out.say(&format!("would write {} objects to node {node}", entries.len()));
+        return Ok(());
+    }
+    let id = node_id(node)?;
+    let mut session = Session::open(global, line)?;
+    let bar = out.progress("writing", entries.len());
+    let total = entries.len();
+    for (number, entry) in entries.into_iter().enumerate() {
+        let at = Address::new(entry.index, entry.subindex);
+        let shown = hex(&entry.data);
+        let written = session.download(id, at, entry.data, false)?;
+        written.map_err(|error| {
+            tell(out, error).context(&format!("entry {} of {total}, {shown}", number + 1))
+        })?;
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    out.document(json!({ "node": node, "written": total }), || {
+        println!("{total} objects written to node {node}");
+    });
+    Ok(())
+}
+
+/// A concise DCF is binary; a DCF or XDC says in text which values it configures.
+fn entries(bytes: &[u8], node: u8) -> Result<Vec<ConciseEntry>, String> {
+    if let Ok(entries) = eds::parse_concise(bytes) {
+        return Ok(entries);
+    }
+    let device = eds::read(bytes).map_err(|error| error.to_string())?.device;
+    device.to_concise(Some(node)).map_err(|error| error.to_string())
+}

@@ -1,0 +1,298 @@
+//! A master on an open endpoint.
+
+use core::time::Duration;
+
+use canopen_master::master::{BusStatus, Config, Event, Master};
+use canopen_master::sdo::{Options, Outcome};
+use canopen_master::{Address, NodeId};
+use motion_io::can::{BusEvent, BusState, Driver, Engine, Event as PortEvent, open};
+use pdo::Frame;
+use serde_json::{Value, json};
+
+use super::cli::CanLine;
+use crate::cli::Global;
+use crate::connect::{ChoiceOf, choose};
+use crate::exit::Exit;
+
+/// Time that a device has for each answer, unless `--timeout` says otherwise.
+const ANSWER: Duration = Duration::from_millis(500);
+/// Time for each step of fastscan: adapters and servers hold answers back for some milliseconds.
+const FASTSCAN_STEP: Duration = Duration::from_millis(25);
+/// Frames that are still to go out when a command is done have so long.
+const FLUSH: Duration = Duration::from_millis(20);
+
+type AnyMaster = Master<'static, Vec<u8>, 127>;
+
+struct Wire(Box<AnyMaster>);
+
+impl Engine for Wire {
+    fn handle_frame(&mut self, now: Duration, frame: &Frame) {
+        let _ = self.0.handle_frame(now, frame);
+    }
+
+    fn handle_timeout(&mut self, now: Duration) {
+        self.0.handle_timeout(now);
+    }
+
+    fn poll_transmit(&mut self, now: Duration) -> Option<Frame> {
+        self.0.poll_transmit(now)
+    }
+
+    fn poll_timeout(&self) -> Option<Duration> {
+        self.0.poll_timeout()
+    }
+
+    fn handle_bus(&mut self, now: Duration, event: BusEvent) {
+        if let BusEvent::State(state) = event {
+            self.0.handle_bus(
+                now,
+                match state {
+                    BusState::Active => BusStatus::Active,
+                    BusState::Warning => BusStatus::Warning,
+                    BusState::Passive => BusStatus::Passive,
+                    BusState::Off => BusStatus::Off,
+                },
+            );
+        }
+    }
+}
+
+/// How an SDO transfer was carried out, as its first frames say.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Mode {
+    Expedited,
+    Segmented,
+    Block,
+}
+
+impl Mode {
+    pub(crate) const fn name(self) -> &'static str {
+        match self {
+            Self::Expedited => "expedited",
+            Self::Segmented => "segmented",
+            Self::Block => "block",
+        }
+    }
+}
+
+/// What the command specifier of the frame that opens a transfer says: the server's answer to an upload,
+/// the client's request of a download (CiA 301, 7.2.4.3).
+fn mode_of(frame: &Frame, node: NodeId, sent: bool) -> Option<Mode> {
+    let base = if sent { pdo::cob::SDO_REQUEST } else { pdo::cob::SDO_RESPONSE };
+    let &[command, ..] = frame.data() else { return None };
+    let expedited = if command & 2 != 0 { Mode::Expedited } else { Mode::Segmented };
+    match (command >> 5, sent) {
+        _ if frame.standard_id() != Some(base + u16::from(node.raw())) => None,
+        (1, true) | (2, false) => Some(expedited),
+        (6, _) => Some(Mode::Block),
+        _ => None,
+    }
+}
+
+/// An SDO transfer that did not succeed.
+#[derive(Debug)]
+pub(crate) struct TransferError {
+    pub(crate) node: u8,
+    pub(crate) at: Address,
+    pub(crate) outcome: Outcome,
+}
+
+impl TransferError {
+    /// What JSON says about it.
+    pub(crate) fn json(&self) -> Value {
+        let mut document = json!({ "node": self.node, "index": self.at.index, "subindex": self.at.sub, "error": self.outcome.to_string() });
+        match self.outcome {
+            Outcome::Aborted(code) => {
+                document["abort_code"] = json!(code.0);
+                document["abort"] = json!(code.text());
+            }
+            Outcome::GaveUp(fault) => {
+                document["fault"] = json!(fault.to_string());
+                document["abort_code"] = json!(fault.abort_code().0);
+            }
+            Outcome::TimedOut => document["abort_code"] = json!(canopen_master::sdo::AbortCode::TIMED_OUT.0),
+            _ => {}
+        }
+        document
+    }
+}
+
+impl From<TransferError> for Exit {
+    fn from(error: TransferError) -> Self {
+        let status = match error.outcome {
+            Outcome::TimedOut => 3,
+            Outcome::Aborted(_) | Outcome::GaveUp(_) => 4,
+            _ => 5,
+        };
+        Self { status, message: format!("node {}, {}: {}", error.node, error.at, error.outcome) }
+    }
+}
+
+/// A master, driven.
+pub(crate) struct Session {
+    driver: Driver,
+    wire: Wire,
+    answer: Duration,
+    watched: Option<(NodeId, bool)>,
+    mode: Option<Mode>,
+}
+
+/// The endpoint that `--can`, the environment or the configuration names.
+pub(crate) fn endpoint(global: &Global, line: &CanLine) -> Result<motion_io::endpoint::CanEndpoint, Exit> {
+    choose(global, line.endpoint.as_deref(), ChoiceOf::Can)?
+        .parse()
+        .map_err(|error: motion_io::endpoint::EndpointError| Exit::usage(error.to_string()))
+}
+
+/// `--timeout`, or the default.
+pub(crate) fn answer_time(global: &Global) -> Result<Duration, Exit> {
+    global.timeout.map_or(Ok(ANSWER), |seconds| duration("--timeout", seconds))
+}
+
+/// Seconds above 0.
+pub(crate) fn duration(option: &str, seconds: f64) -> Result<Duration, Exit> {
+    Duration::try_from_secs_f64(seconds)
+        .ok()
+        .filter(|time| !time.is_zero())
+        .ok_or_else(|| Exit::usage(format!("{option} {seconds}: seconds above 0 expected")))
+}
+
+/// A node ID.
+pub(crate) fn node_id(raw: u8) -> Result<NodeId, Exit> {
+    NodeId::new(raw).map_err(|error| Exit::usage(error.to_string()))
+}
+
+fn gone(error: &std::io::Error) -> Exit {
+    Exit::trouble(format!("the endpoint failed: {error}"))
+}
+
+impl Session {
+    pub(crate) fn open(global: &Global, line: &CanLine) -> Result<Self, Exit> {
+        let answer = answer_time(global)?;
+        let port = open(&endpoint(global, line)?).map_err(|error| Exit::trouble(error.to_string()))?;
+        let config = Config {
+            confirm: answer,
+            lss: canopen_master::lss::Config { answer, fastscan_step: FASTSCAN_STEP },
+            ..Config::default()
+        };
+        let wire = Wire(Box::new(Master::new(config)));
+        Ok(Self { driver: Driver::new(port), wire, answer, watched: None, mode: None })
+    }
+
+    pub(crate) fn now(&self) -> Duration {
+        self.driver.now()
+    }
+
+    pub(crate) fn master(&mut self) -> &mut AnyMaster {
+        &mut self.wire.0
+    }
+
+    /// `--timeout`.
+    pub(crate) const fn answer(&self) -> Duration {
+        self.answer
+    }
+
+    /// One turn, at most until `limit`; `observe` sees all frames and bus events.
+    pub(crate) fn turn(
+        &mut self,
+        limit: Duration,
+        mut observe: impl FnMut(Duration, PortEvent, bool),
+    ) -> Result<(), Exit> {
+        let (watched, mode) = (self.watched, &mut self.mode);
+        let done = self.driver.turn(&mut self.wire, limit, |now, event, sent| {
+            if let (PortEvent::Frame(frame), Some((node, is_upload))) = (&event, watched)
+                && mode.is_none()
+                && sent != is_upload
+            {
+                *mode = mode_of(frame, node, sent);
+            }
+            observe(now, event, sent);
+        });
+        done.map_err(|error| gone(&error))
+    }
+
+    /// Runs until `pick` takes an event, at most until `limit`.
+    pub(crate) fn wait<T>(
+        &mut self,
+        limit: Duration,
+        mut pick: impl FnMut(Event<Vec<u8>>) -> Option<T>,
+    ) -> Result<Option<T>, Exit> {
+        loop {
+            while let Some(event) = self.wire.0.poll_event() {
+                if let Some(picked) = pick(event) {
+                    return Ok(Some(picked));
+                }
+            }
+            if self.now() >= limit {
+                return Ok(None);
+            }
+            self.turn(limit, |_, _, _| {})?;
+        }
+    }
+
+    /// Lets out what is still to be sent, such as an abort.
+    pub(crate) fn flush(&mut self) -> Result<(), Exit> {
+        let limit = self.now() + FLUSH;
+        self.wait(limit, |_| None::<()>).map(|_| ())
+    }
+
+    fn transfer(
+        &mut self,
+        node: NodeId,
+        at: Address,
+        begin: impl FnOnce(&mut AnyMaster) -> Result<(), Exit>,
+    ) -> Result<Result<Vec<u8>, TransferError>, Exit> {
+        self.mode = None;
+        begin(&mut self.wire.0)?;
+        let finished = self.wait(Duration::MAX, |event| match event {
+            Event::Sdo { finished, .. } => Some(finished),
+            _ => None,
+        })?;
+        self.watched = None;
+        let Some(finished) = finished else { return Err(Exit::trouble("the transfer has no outcome")) };
+        match finished.outcome {
+            Outcome::Done(_) => Ok(Ok(finished.buffer)),
+            outcome => {
+                self.flush()?;
+                Ok(Err(TransferError { node: node.raw(), at, outcome }))
+            }
+        }
+    }
+
+    fn options(&self, block: bool) -> Options {
+        if block { Options::block(self.answer) } else { Options::new(self.answer) }
+    }
+
+    /// Reads an object.
+    pub(crate) fn upload(
+        &mut self,
+        node: NodeId,
+        at: Address,
+        block: bool,
+    ) -> Result<Result<(Vec<u8>, Mode), TransferError>, Exit> {
+        let options = self.options(block);
+        self.watched = Some((node, true));
+        let done = self.transfer(node, at, |master| {
+            let begun = master.upload(node, at, Vec::new(), &options);
+            begun.map(|_| ()).map_err(|refused| Exit::trouble(refused.to_string()))
+        })?;
+        Ok(done.map(|data| (data, self.mode.unwrap_or(Mode::Segmented))))
+    }
+
+    /// Writes an object.
+    pub(crate) fn download(
+        &mut self,
+        node: NodeId,
+        at: Address,
+        data: Vec<u8>,
+        block: bool,
+    ) -> Result<Result<Mode, TransferError>, Exit> {
+        let options = self.options(block);
+        self.watched = Some((node, false));
+        let done = self.transfer(node, at, |master| {
+            let begun = master.download(node, at, data, &options);
+            begun.map(|_| ()).map_err(|refused| Exit::trouble(refused.to_string()))
+        })?;
+        Ok(done.map(|_| self.mode.unwrap_or(Mode::Segmented)))
+    }
+}

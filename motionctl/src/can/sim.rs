@@ -1,0 +1,70 @@
+//! `motionctl sim drive`, `sim io`, `sim node`: virtual CANopen nodes.
+
+use core::sync::atomic::Ordering;
+use core::time::Duration;
+
+use device_sim::canopen::{Device, FileNode, Ld2000, Node, RemoteIo};
+use motion_io::can::{BusEvent, Driver, open};
+use pdo::NodeId;
+use serde_json::json;
+
+use super::cli::{SimFile, SimIo, SimNode};
+use super::session::{endpoint, node_id};
+use super::stop_flag;
+use crate::cli::Global;
+use crate::exit::Exit;
+use crate::output::Output;
+
+/// Longest time between two looks at the stop signal.
+const STEP: Duration = Duration::from_millis(100);
+/// `--node 255`.
+const NO_NODE: u8 = 255;
+
+fn node(arguments: &SimNode) -> Result<Option<NodeId>, Exit> {
+    if arguments.node == NO_NODE { Ok(None) } else { node_id(arguments.node).map(Some) }
+}
+
+pub(crate) fn drive(out: &Output, global: &Global, arguments: &SimNode) -> Result<(), Exit> {
+    let device = Ld2000::node(node(arguments)?, arguments.serial_number);
+    run(out, global, arguments, "drive", device)
+}
+
+pub(crate) fn io(out: &Output, global: &Global, arguments: &SimIo) -> Result<(), Exit> {
+    let device = RemoteIo::node(node(&arguments.node)?, arguments.node.serial_number, arguments.wired);
+    run(out, global, &arguments.node, "io", device)
+}
+
+pub(crate) fn file(out: &Output, global: &Global, arguments: &SimFile) -> Result<(), Exit> {
+    let name = arguments.eds.display().to_string();
+    let bytes = std::fs::read(&arguments.eds).map_err(|error| Exit::file(&name, &error))?;
+    let device = FileNode::node(&bytes, node(&arguments.node)?, arguments.node.serial_number)
+        .map_err(|error| Exit::file(&name, &error))?;
+    run(out, global, &arguments.node, "node", device)
+}
+
+fn run<D: Device>(
+    out: &Output,
+    global: &Global,
+    arguments: &SimNode,
+    kind: &str,
+    mut node: Node<D>,
+) -> Result<(), Exit> {
+    let endpoint = endpoint(global, &arguments.line)?;
+    let stop = stop_flag()?;
+    let port = open(&endpoint).map_err(|error| Exit::trouble(error.to_string()))?;
+    let mut driver = Driver::new(port);
+    let text = endpoint.to_string();
+    out.document(json!({ "event": "ready", "kind": kind, "node": arguments.node, "endpoint": text }), || {
+        println!("{kind}, node {}, listening on {text}", arguments.node);
+    });
+    while !stop.load(Ordering::Relaxed) {
+        let limit = driver.now() + STEP;
+        let told = |event| {
+            if let BusEvent::State(_) = event {
+                out.remark(event.to_string());
+            }
+        };
+        driver.run(&mut node, limit, told).map_err(|error| Exit::trouble(format!("{text}: {error}")))?;
+    }
+    Ok(())
+}

@@ -1,0 +1,196 @@
+//! The real program on a virtual bus: a `bus`, virtual nodes, and commands, each a process of its own.
+
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+use std::process::{Child, ChildStdout, Command, Output, Stdio};
+
+use serde_json::{Value, json};
+
+/// A process that runs until it is dropped.
+struct Running {
+    child: Child,
+    /// Open as long as the process runs, so that what it says has somewhere to go.
+    _said: BufReader<ChildStdout>,
+}
+
+impl Running {
+    /// Starts the program and waits for its first line.
+    fn start(arguments: &[&str], directory: &Path) -> (Self, Value) {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_motionctl"))
+            .args(arguments)
+            .arg("--json")
+            .current_dir(directory)
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        let mut said = BufReader::new(child.stdout.take().unwrap());
+        let mut line = String::new();
+        said.read_line(&mut line).unwrap();
+        let ready = serde_json::from_str(&line).unwrap_or_else(|error| panic!("{line:?}: {error}"));
+        (Self { child, _said: said }, ready)
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+struct Bench {
+    directory: tempfile::TempDir,
+    endpoint: String,
+    running: Vec<Running>,
+}
+
+impl Bench {
+    fn new() -> Self {
+        let directory = tempfile::tempdir().unwrap();
+        let (bus, ready) =
+            Running::start(&["bus", "--listen", "127.0.0.1:0", "--bitrate", "1000000"], directory.path());
+        let endpoint = format!("socketcand:{}/can0", ready["listen"].as_str().unwrap());
+        Self { directory, endpoint, running: vec![bus] }
+    }
+
+    fn sim(&mut self, arguments: &[&str]) {
+        let arguments: Vec<&str> = ["sim"].iter().chain(arguments).copied().collect();
+        let arguments = [&arguments[..], &["--can", &self.endpoint]].concat();
+        let (node, ready) = Running::start(&arguments, self.directory.path());
+        assert_eq!(ready["event"], "ready");
+        self.running.push(node);
+        // It is there when it answers.
+        self.can(&["scan", "--nodes", "1"], 0);
+    }
+
+    fn run(&self, arguments: &[&str]) -> Output {
+        Command::new(env!("CARGO_BIN_EXE_motionctl"))
+            .args(["--json", "can"])
+            .args(arguments)
+            .env("MOTIONCTL_CAN", &self.endpoint)
+            .current_dir(self.directory.path())
+            .env_remove("MOTIONCTL_CONFIG")
+            .stdin(Stdio::null())
+            .output()
+            .unwrap()
+    }
+
+    #[track_caller]
+    fn can(&self, arguments: &[&str], status: i32) -> Value {
+        let output = self.run(arguments);
+        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        let error = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(status), "{arguments:?}: {text}\n{error}");
+        text.lines().last().map_or(Value::Null, |line| serde_json::from_str(line).unwrap())
+    }
+}
+
+#[test]
+fn a_network_of_drive_and_io() {
+    let mut bench = Bench::new();
+    bench.sim(&["drive", "--node", "1"]);
+    bench.sim(&["io", "--node", "5", "--wired", "--serial-number", "9"]);
+
+    let scan = bench.can(&["scan"], 0);
+    let nodes = scan["nodes"].as_array().unwrap();
+    assert_eq!(nodes.len(), 2);
+    assert_eq!(
+        (&nodes[0]["node"], &nodes[0]["profile"], &nodes[0]["name"]),
+        (&json!(1), &json!(0x192), &json!("SD03"))
+    );
+    assert_eq!(nodes[0]["identity"]["vendor"], 0x6A);
+    assert_eq!((&nodes[1]["node"], &nodes[1]["state"]), (&json!(5), &json!("pre-operational")));
+
+    let read = bench.can(&["sdo", "read", "1", "1000h", "--type", "u32"], 0);
+    let expected = json!({
+        "schema_version": 1, "node": 1, "index": 0x1000, "subindex": 0,
+        "mode": "expedited", "size": 4, "data": "92010200", "value": 0x0002_0192,
+    });
+    assert_eq!(read, expected);
+    assert_eq!(bench.can(&["sdo", "read", "5", "0x100A", "--type", "string"], 0)["mode"], "segmented");
+
+    // Every mode, there and back.
+    let big: Vec<u8> = (0..20_000u32).map(|i| (i * 7 / 3) as u8).collect();
+    std::fs::write(bench.directory.path().join("big"), &big).unwrap();
+    for (more, mode) in [(&[][..], "segmented"), (&["--block"][..], "block")] {
+        let written = bench.can(&[&["sdo", "write", "5", "0x2000:1", "--file", "big"], more].concat(), 0);
+        assert_eq!((&written["mode"], &written["size"]), (&json!(mode), &json!(20_000)));
+        let read = bench.can(&[&["sdo", "read", "5", "0x2000:1", "--output", "back"], more].concat(), 0);
+        assert_eq!(read["mode"], mode);
+        assert!(std::fs::read(bench.directory.path().join("back")).unwrap() == big);
+    }
+
+    // Refused, silent, misspelt, absent.
+    let refused = bench.can(&["sdo", "write", "5", "0x1000", "1", "--type", "u32"], 4);
+    assert_eq!(refused["abort_code"], 0x0601_0002);
+    assert_eq!(bench.can(&["sdo", "read", "9", "0x1000", "--timeout", "0.05"], 3)["abort_code"], 0x0504_0000);
+    bench.can(&["sdo", "read", "5", "1000"], 2);
+    bench.can(&["sdo", "write", "5", "0x6411:1", "1"], 2);
+    bench.can(&["sdo", "write", "5", "0x6411:1", "--type", "i16", "--", "-5"], 0);
+    assert_eq!(bench.can(&["sdo", "read", "5", "0x6411:1", "--type", "i16"], 0)["value"], -5);
+
+    assert_eq!(bench.can(&["nmt", "start", "5"], 0)["nodes"], json!([{ "node": 5, "state": "operational" }]));
+    let all = bench.can(&["nmt", "start", "all"], 0);
+    let operational = |node| json!({ "node": node, "state": "operational" });
+    assert_eq!(all["nodes"], json!([operational(1), operational(5)]));
+    assert_eq!(bench.can(&["nmt", "reset-node", "5"], 0)["nodes"][0]["state"], "boot-up");
+    bench.can(&["nmt", "stop", "9", "--timeout", "0.05"], 3);
+
+    let map = ["pdo", "write", "5", "tpdo2", "--map", "0x6401:1:16", "0x6000:1:8", "--transmission", "1"];
+    let pdo = bench.can(&map, 0);
+    assert_eq!((&pdo["id"], &pdo["enabled"], &pdo["transmission"]), (&json!(0x285), &json!(true), &json!(1)));
+    assert_eq!(pdo["mapping"][1], json!({ "index": 0x6000, "subindex": 1, "bits": 8 }));
+    assert_eq!(bench.can(&["pdo", "read", "5", "tpdo2"], 0), pdo);
+    assert_eq!(
+        bench.can(&["pdo", "write", "5", "tpdo2", "--map", "0x1000:0:32"], 4)["abort_code"],
+        0x0604_0041
+    );
+
+    let guard = bench.can(&["guard", "9", "--for", "0.5", "--period", "0.05"], 0);
+    assert_eq!((&guard["node"], &guard["event"]), (&json!(9), &json!("lost")));
+
+    // A concise DCF: two entries.
+    let concise = [2u8, 0, 0, 0, 0x02, 0x62, 1, 1, 0, 0, 0, 0x0F, 0x17, 0x10, 0, 2, 0, 0, 0, 0xF4, 0x01];
+    std::fs::write(bench.directory.path().join("concise"), concise).unwrap();
+    assert_eq!(bench.can(&["dcf", "5", "concise"], 0)["written"], 2);
+    assert_eq!(bench.can(&["sdo", "read", "5", "0x1017", "--type", "u16"], 0)["value"], 500);
+}
+
+#[test]
+fn layer_setting_services() {
+    let mut bench = Bench::new();
+    bench.can(&["lss", "fastscan"], 3);
+    bench.sim(&["io", "--node", "255", "--serial-number", "77"]);
+    let found = bench.can(&["lss", "fastscan"], 0);
+    assert_eq!((&found["product"], &found["serial"]), (&json!(0x191), &json!(77)));
+    assert_eq!(bench.can(&["lss", "identify"], 0)["node"], 255);
+    bench.can(&["lss", "set-bit-timing", "300"], 2);
+    bench.can(&["lss", "set-bit-timing", "500"], 0);
+    bench.can(&["lss", "set-node", "9"], 0);
+    bench.can(&["lss", "store"], 0);
+    assert_eq!(bench.can(&["scan", "--nodes", "9"], 0)["nodes"][0]["node"], 9);
+    assert_eq!(bench.can(&["lss", "identify", "--identity", "0:0x191:1:77"], 0)["node"], 9);
+    bench.can(&["lss", "identify", "--identity", "0:0x191:1:78"], 3);
+}
+
+#[test]
+fn endpoints_that_are_not_there() {
+    let bench = Bench::new();
+    for (endpoint, status) in [
+        ("nonsense", 2),
+        ("socketcand:127.0.0.1:1/can0", 5),
+        ("slcan:/dev/nothing", 5),
+        ("socketcan:nothing", 5),
+    ] {
+        let ended = Command::new(env!("CARGO_BIN_EXE_motionctl"))
+            .args(["can", "scan", "--can", endpoint])
+            .stdin(Stdio::null())
+            .output()
+            .unwrap();
+        let said = String::from_utf8_lossy(&ended.stderr).into_owned();
+        assert_eq!(ended.status.code(), Some(status), "{endpoint}: {said}");
+    }
+    drop(bench);
+}
