@@ -19,9 +19,6 @@ pub(super) struct Dictionary {
     model: u16,
 }
 
-/// Its process data are frames of the bus, not of its dictionary.
-impl slave::Objects for Dictionary {}
-
 impl Access for Dictionary {
     fn read(&mut self, at: Address, offset: u32, out: &mut [u8]) -> Result<(usize, Total), AbortCode> {
         let long = |value: u32| value.to_le_bytes();
