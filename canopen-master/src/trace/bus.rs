@@ -5,7 +5,8 @@ use alloc::collections::{BTreeMap, VecDeque};
 use alloc::vec;
 use core::time::Duration;
 
-use pdo::{Address, CobId, Frame, NodeId, Service};
+use embedded_can::Id;
+use pdo::{Address, CobId, NodeId, Service};
 
 use super::kind::{Kind, Lss};
 use super::mapping::{Mapped, PdoDirection, PdoState};
@@ -18,6 +19,28 @@ use crate::time::TimeOfDay;
 /// First identifier of CAN Link less 1, and its channels.
 const CAN_LINK: u16 = 0x100;
 const CAN_LINK_CHANNELS: u8 = 14;
+
+/// A frame with an 11-bit identifier.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Heard<'a> {
+    id: u16,
+    remote: bool,
+    data: &'a [u8],
+}
+
+impl<'a> Heard<'a> {
+    /// `None` of a frame with a 29-bit identifier.
+    #[inline]
+    pub(super) fn new(frame: &'a impl embedded_can::Frame) -> Option<Self> {
+        match frame.id() {
+            Id::Standard(id) => {
+                let remote = frame.is_remote_frame();
+                Some(Self { id: id.as_raw(), remote, data: if remote { &[] } else { frame.data() } })
+            }
+            Id::Extended(_) => None,
+        }
+    }
+}
 
 /// What an identifier is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -89,11 +112,11 @@ impl NodeState {
 
 /// A frame that needs no state to be understood.
 #[inline]
-fn plain(role: Role, frame: &Frame) -> Kind {
-    let data = frame.data();
+fn plain(role: Role, frame: Heard<'_>) -> Kind {
+    let data = frame.data;
     match role {
         Role::Pdo(node, direction, number) => Kind::Pdo { node, direction, number },
-        _ if frame.is_remote() => Kind::Unknown,
+        _ if frame.remote => Kind::Unknown,
         Role::Sync => {
             let counter = match data {
                 &[counter] => Some(counter),
@@ -173,7 +196,11 @@ impl BusState {
         self.nodes.get(usize::from(node.raw()))?.state
     }
 
+    #[inline]
     pub(super) fn fields(&self, node: NodeId, direction: PdoDirection, number: u16) -> &[Mapped] {
+        if self.pdos.is_empty() {
+            return &[];
+        }
         self.pdos.get(&(node, direction, number)).map_or(&[], PdoState::objects)
     }
 
@@ -182,19 +209,18 @@ impl BusState {
         &mut self,
         now: Option<Duration>,
         bus: u16,
-        frame: &Frame,
+        frame: Heard<'_>,
         events: &mut VecDeque<Transfer>,
     ) -> Kind {
-        let Some(id) = frame.standard_id() else { return Kind::Unknown };
-        let role = self.roles.get(usize::from(id)).copied().unwrap_or(Role::Unknown);
-        match (role, frame.is_remote()) {
+        let role = self.roles.get(usize::from(frame.id)).copied().unwrap_or(Role::Unknown);
+        match (role, frame.remote) {
             (Role::ErrorControl(node), true) => self.guard_request(node),
             (Role::ErrorControl(node), false) => match self.nodes.get_mut(usize::from(node.raw())) {
-                Some(known) => known.handle(node, frame.data()),
+                Some(known) => known.handle(node, frame.data),
                 None => Kind::Unknown,
             },
             (Role::Sdo(node, channel, way), false) => {
-                self.sdo(now, bus, node, channel, way, frame.data(), events)
+                self.sdo(now, bus, node, channel, way, frame.data, events)
             }
             (Role::Sync, false) => {
                 let interval = now.zip(self.last_sync).map(|(now, last)| now.saturating_sub(last));
@@ -216,21 +242,20 @@ impl BusState {
     }
 
     /// What a frame is, without any consequence.
-    pub(super) fn look(&self, frame: &Frame) -> Kind {
-        let Some(id) = frame.standard_id() else { return Kind::Unknown };
+    pub(super) fn look(&self, frame: Heard<'_>) -> Kind {
         let known = |node: NodeId| self.nodes.get(usize::from(node.raw())).copied().unwrap_or_default();
-        let role = self.roles.get(usize::from(id)).copied().unwrap_or(Role::Unknown);
-        match (role, frame.is_remote()) {
+        let role = self.roles.get(usize::from(frame.id)).copied().unwrap_or(Role::Unknown);
+        match (role, frame.remote) {
             (Role::ErrorControl(node), true) => Kind::GuardRequest { node, unanswered: known(node).asked },
-            (Role::ErrorControl(node), false) => known(node).handle(node, frame.data()),
+            (Role::ErrorControl(node), false) => known(node).handle(node, frame.data),
             (Role::Sdo(node, channel, way), false) => {
                 let watch = match channel {
                     0 => self.sdo.get(usize::from(node.raw())).and_then(Option::as_deref),
                     _ => self.further_sdo.get(&(node, channel)).map(Box::as_ref),
                 };
                 sdo_kind(match watch {
-                    Some(watch) => watch.look(way, frame.data()),
-                    None => Watch::new(node).look(way, frame.data()),
+                    Some(watch) => watch.look(way, frame.data),
+                    None => Watch::new(node).look(way, frame.data),
                 })
             }
             _ => plain(role, frame),

@@ -14,18 +14,18 @@ mod kind;
 mod mapping;
 mod sdo;
 
-use alloc::collections::{BTreeMap, VecDeque};
+use alloc::collections::VecDeque;
 use alloc::vec::Vec;
 use core::time::Duration;
 
-use pdo::{Address, Frame, NodeId};
+use pdo::{Address, NodeId};
 
 pub use kind::{Kind, Lss};
 pub use mapping::{Field, Fields, Mapped, PdoDirection};
 pub use sdo::{Content, Direction, MAX_KEPT, Mode, Outcome, SdoFrame, Transfer, Way};
 
 use crate::nmt::State;
-use bus::BusState;
+use bus::{BusState, Heard};
 
 /// A passive decoder of CANopen traffic.
 ///
@@ -36,7 +36,8 @@ use bus::BusState;
 /// - Getters: [`state`](Self::state), [`mapped`](Self::mapped).
 #[derive(Debug, Default)]
 pub struct Tracer {
-    buses: BTreeMap<u16, BusState>,
+    /// By number, in order of appearance: captures have few.
+    buses: Vec<(u16, BusState)>,
     /// Values of objects that hold on every bus from the start.
     given: Vec<(NodeId, Address, Vec<u8>)>,
     can_link: bool,
@@ -58,7 +59,7 @@ impl Tracer {
     /// Tells the value of an object of a node, as an EDS, a DCF or a person has it, for all buses.
     /// Communication and mapping parameters change how frames are understood from now on.
     pub fn learn(&mut self, node: NodeId, at: Address, value: &[u8]) {
-        for bus in self.buses.values_mut() {
+        for (_, bus) in &mut self.buses {
             bus.learn(node, at, value);
         }
         self.given.push((node, at, value.into()));
@@ -66,23 +67,50 @@ impl Tracer {
 
     /// Takes one frame of a bus and says what it is. `now` is `None` where nobody knows the time.
     #[inline]
-    pub fn handle_frame(&mut self, now: Option<Duration>, bus: u16, frame: &Frame) -> Kind {
-        let Self { buses, events, given, can_link } = self;
-        let state = buses.entry(bus).or_insert_with(|| {
-            let mut state = BusState::new(*can_link);
-            for (node, at, value) in given {
-                state.learn(*node, *at, value);
-            }
-            state
-        });
-        state.handle_frame(now, bus, frame, events)
+    pub fn handle_frame(
+        &mut self,
+        now: Option<Duration>,
+        bus: u16,
+        frame: &impl embedded_can::Frame,
+    ) -> Kind {
+        match Heard::new(frame) {
+            Some(frame) => self.handle(now, bus, frame),
+            None => Kind::Unknown,
+        }
+    }
+
+    fn handle(&mut self, now: Option<Duration>, bus: u16, frame: Heard<'_>) -> Kind {
+        let at = match self.buses.iter().position(|(known, _)| *known == bus) {
+            Some(at) => at,
+            None => self.add_bus(bus),
+        };
+        match self.buses.get_mut(at) {
+            Some((_, state)) => state.handle_frame(now, bus, frame, &mut self.events),
+            None => Kind::Unknown,
+        }
+    }
+
+    #[cold]
+    fn add_bus(&mut self, bus: u16) -> usize {
+        let mut state = BusState::new(self.can_link);
+        for (node, at, value) in &self.given {
+            state.learn(*node, *at, value);
+        }
+        self.buses.push((bus, state));
+        self.buses.len() - 1
+    }
+
+    #[inline]
+    fn bus(&self, bus: u16) -> Option<&BusState> {
+        self.buses.iter().find(|(known, _)| *known == bus).map(|(_, state)| state)
     }
 
     /// Says what a frame is and draws no consequence from it: for copies of frames that a capture holds
     /// twice.
     #[must_use]
-    pub fn look(&self, bus: u16, frame: &Frame) -> Kind {
-        match self.buses.get(&bus) {
+    pub fn look(&self, bus: u16, frame: &impl embedded_can::Frame) -> Kind {
+        let Some(frame) = Heard::new(frame) else { return Kind::Unknown };
+        match self.bus(bus) {
             Some(state) => state.look(frame),
             None => BusState::new(self.can_link).look(frame),
         }
@@ -90,7 +118,7 @@ impl Tracer {
 
     /// The capture has ended: every transfer still open ends as incomplete.
     pub fn finish(&mut self) {
-        for state in self.buses.values_mut() {
+        for (_, state) in &mut self.buses {
             state.finish(&mut self.events);
         }
     }
@@ -104,13 +132,14 @@ impl Tracer {
     /// The state that a node last showed, or was last sent to.
     #[must_use]
     pub fn state(&self, bus: u16, node: NodeId) -> Option<State> {
-        self.buses.get(&bus)?.state(node)
+        self.bus(bus)?.state(node)
     }
 
     /// What a frame of a PDO carries, object by object; nothing where its mapping is not known.
     #[must_use]
+    #[inline]
     pub fn mapped<'a>(&'a self, bus: u16, kind: &Kind, data: &'a [u8]) -> Fields<'a> {
-        let fields = match (kind, self.buses.get(&bus)) {
+        let fields = match (kind, self.bus(bus)) {
             (&Kind::Pdo { node, direction, number, .. }, Some(state)) => {
                 state.fields(node, direction, number)
             }

@@ -13,6 +13,8 @@ const SECONDS: i64 = 1_000_000_000;
 /// Reads candump lines of either form, line by line.
 #[derive(Debug, Default)]
 pub(super) struct Candump {
+    /// Whole seconds of the line before, as text and as nanoseconds: the next line mostly has the same.
+    seconds: ([u8; 10], i64),
     /// The line before was an error report, whose explanation may follow on lines of its own.
     after_error: bool,
 }
@@ -20,11 +22,52 @@ pub(super) struct Candump {
 impl Candump {
     #[inline]
     pub(super) fn line(&mut self, line: &[u8], record: &mut Record, buses: &mut Buses) -> Parsed {
-        if self.after_error {
+        if self.log_line(line, record, buses).is_some() {
             self.after_error = false;
-            if line.first() == Some(&b'\t') {
-                return Parsed::Nothing;
+            return Parsed::Frame;
+        }
+        self.any_line(line, record, buses)
+    }
+
+    /// A line as `candump -l` writes nearly all of them: epoch time with microseconds, the bus of the
+    /// line before, a data frame with an 11-bit identifier. `None` of any other.
+    #[inline]
+    fn log_line(&mut self, line: &[u8], record: &mut Record, buses: &Buses) -> Option<()> {
+        let (head, rest) = line.split_first_chunk::<20>()?;
+        let &[b'(', ref seconds @ .., b'.', a, b, c, d, e, f, b')', b' '] = head else { return None };
+        let (bus, name) = buses.last()?;
+        let rest = rest.strip_prefix(name)?;
+        let (&[b' ', i, j, k, b'#'], data) = rest.split_first_chunk::<5>()? else { return None };
+        let (i, j, k) = (nibble(i), nibble(j), nibble(k));
+        if i | j | k > 0x0F || i > 7 {
+            return None;
+        }
+        let room = record.frame.data.first_chunk_mut::<8>()?;
+        let len = hex_run(data, room)?;
+        let mut micros = 0;
+        for digit in [a, b, c, d, e, f] {
+            if !digit.is_ascii_digit() {
+                return None;
             }
+            micros = micros * 10 + u32::from(digit - b'0');
+        }
+        if self.seconds.0 != *seconds {
+            self.seconds = (*seconds, decimal(seconds)? as i64 * SECONDS);
+        }
+        record.time = Some(Time(self.seconds.1 + i64::from(micros) * 1000));
+        record.bus = Some(bus);
+        record.direction = None;
+        record.loopback = false;
+        record.frame.id = u32::from(i) << 8 | u32::from(j) << 4 | u32::from(k);
+        record.frame.extended = false;
+        record.frame.kind = FrameKind::Data;
+        record.frame.len = len as u8;
+        Some(())
+    }
+
+    fn any_line(&mut self, line: &[u8], record: &mut Record, buses: &mut Buses) -> Parsed {
+        if core::mem::take(&mut self.after_error) && line.first() == Some(&b'\t') {
+            return Parsed::Nothing;
         }
         let parsed = match memchr::memchr(0x1B, line) {
             None => parse(line, record, buses),

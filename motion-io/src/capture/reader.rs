@@ -107,6 +107,13 @@ impl<R: Read> Reader<R> {
         self.buses.name(bus)
     }
 
+    /// The frame that [`next`](Self::next) gave last.
+    #[must_use]
+    #[inline]
+    pub const fn record(&self) -> &Record {
+        &self.record
+    }
+
     /// The next frame or damage; `None` at the end.
     ///
     /// # Errors

@@ -2,6 +2,8 @@
 
 use core::fmt;
 
+use embedded_can::{ExtendedId, Id, StandardId};
+
 /// Longest data of a CAN FD frame in bytes.
 pub(super) const MAX_DATA: usize = 64;
 
@@ -109,6 +111,7 @@ impl Frame {
 
     /// The data; none of a remote frame.
     #[must_use]
+    #[inline]
     pub fn data(&self) -> &[u8] {
         if self.kind == FrameKind::Remote {
             return &[];
@@ -116,19 +119,61 @@ impl Frame {
         self.data.get(..self.len()).unwrap_or(&[])
     }
 
-    /// The frame as engines take it; `None` of FD frames and error reports.
+    /// The frame itself, as engines take it; `None` of FD frames and error reports.
     #[must_use]
-    pub fn classic(&self) -> Option<pdo::Frame> {
-        let id = if self.extended {
-            embedded_can::Id::Extended(embedded_can::ExtendedId::new(self.id)?)
-        } else {
-            embedded_can::Id::Standard(embedded_can::StandardId::new(u16::try_from(self.id).ok()?)?)
-        };
+    #[inline]
+    pub const fn classic(&self) -> Option<&Self> {
         match self.kind {
-            FrameKind::Data => pdo::Frame::data_frame(id, self.data()),
-            FrameKind::Remote => pdo::Frame::remote_frame(id, self.len()),
+            FrameKind::Data | FrameKind::Remote => Some(self),
             FrameKind::Error | FrameKind::Fd { .. } => None,
         }
+    }
+}
+
+/// Data frames of more than 8 bytes come out as FD frames.
+impl embedded_can::Frame for Frame {
+    fn new(id: impl Into<Id>, data: &[u8]) -> Option<Self> {
+        let (id, extended) = raw(id.into());
+        let fd = FrameKind::Fd { bit_rate_switch: false, error_passive: false };
+        Self::new(id, extended, if data.len() > 8 { fd } else { FrameKind::Data }, data)
+    }
+
+    fn new_remote(id: impl Into<Id>, dlc: usize) -> Option<Self> {
+        let (id, extended) = raw(id.into());
+        Self::new(id, extended, FrameKind::Remote, [0; 8].get(..dlc)?)
+    }
+
+    fn is_extended(&self) -> bool {
+        self.extended
+    }
+
+    fn is_remote_frame(&self) -> bool {
+        self.kind == FrameKind::Remote
+    }
+
+    #[inline]
+    fn id(&self) -> Id {
+        let standard = if self.extended { None } else { StandardId::new(self.id as u16) };
+        match standard {
+            Some(id) => Id::Standard(id),
+            None => Id::Extended(ExtendedId::new(self.id).unwrap_or(ExtendedId::ZERO)),
+        }
+    }
+
+    fn dlc(&self) -> usize {
+        self.len()
+    }
+
+    #[inline]
+    fn data(&self) -> &[u8] {
+        self.data()
+    }
+}
+
+fn raw(id: Id) -> (u32, bool) {
+    match id {
+        Id::Standard(id) => (u32::from(id.as_raw()), false),
+        Id::Extended(id) => (id.as_raw(), true),
     }
 }
 
@@ -233,6 +278,13 @@ impl Buses {
             };
         }
         u16::try_from(self.last).ok().map(Bus)
+    }
+
+    /// The bus found last and its name.
+    #[inline]
+    pub(super) fn last(&self) -> Option<(Bus, &[u8])> {
+        let name = self.names.get(self.last)?;
+        Some((Bus(self.last as u16), name.as_bytes()))
     }
 
     pub(super) fn name(&self, bus: Bus) -> Option<&str> {

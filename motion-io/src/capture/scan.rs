@@ -58,6 +58,19 @@ pub(super) fn hex_run(text: &[u8], out: &mut [u8]) -> Option<usize> {
         return None;
     }
     let mut bad = 0;
+    // The bytes of a classic frame are stored in one go: what is read together soon is written so.
+    if pairs.len() <= 8
+        && let Some(room) = out.first_chunk_mut::<8>()
+    {
+        let mut value = 0_u64;
+        for (at, &[high, low]) in pairs.iter().enumerate() {
+            let (high, low) = (nibble(high), nibble(low));
+            bad |= high | low;
+            value |= u64::from(high << 4 | low & 0x0F) << (8 * at);
+        }
+        *room = value.to_le_bytes();
+        return (bad <= 0x0F).then_some(pairs.len());
+    }
     for (&[high, low], byte) in pairs.iter().zip(out) {
         let (high, low) = (nibble(high), nibble(low));
         bad |= high | low;

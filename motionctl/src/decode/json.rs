@@ -14,7 +14,7 @@ use canopen_master::trace::{
 use motion_io::capture::{Direction, FrameKind, Record, Time};
 
 use super::names::Names;
-use super::{ERROR_FRAME, NAMES, Teller, Totals, UNKNOWN, name_of};
+use super::{NAMES, Teller, Totals, name_of, number_of};
 
 /// Writes JSON without blanks.
 pub(super) struct Json<'a> {
@@ -22,23 +22,72 @@ pub(super) struct Json<'a> {
     names: &'a Names,
     /// The last bus and how it is written.
     bus: (String, Vec<u8>),
+    /// By 11-bit identifier: what stands between the time and the data of plain data frames.
+    heads: Vec<Head>,
+    /// Whole seconds of the frame before, and how they are written.
+    seconds: (u64, Piece<24>),
 }
 
-/// Two digits for every byte.
-const HEX: [[u8; 2]; 256] = {
-    const DIGITS: &[u8; 16] = b"0123456789ABCDEF";
-    let mut table = [[0; 2]; 256];
-    let mut byte = 0;
-    while byte < 256 {
-        table[byte] = [DIGITS[byte >> 4], DIGITS[byte & 15]];
-        byte += 1;
-    }
-    table
-};
+/// A short piece of text that is copied in one go.
+#[derive(Debug, Clone, Copy)]
+struct Piece<const N: usize> {
+    text: [u8; N],
+    len: usize,
+}
 
+impl<const N: usize> Piece<N> {
+    const EMPTY: Self = Self { text: [0; N], len: 0 };
+
+    /// `None` where the text is longer.
+    fn new(text: &[u8]) -> Option<Self> {
+        let mut piece = Self { len: text.len(), ..Self::EMPTY };
+        piece.text.get_mut(..text.len())?.copy_from_slice(text);
+        Some(piece)
+    }
+
+    #[inline]
+    fn put(&self, out: &mut Vec<u8>) {
+        let end = out.len() + self.len;
+        out.extend_from_slice(&self.text);
+        out.truncate(end);
+    }
+}
+
+/// The constant text around the data of one identifier on one bus.
+#[derive(Debug, Clone, Copy)]
+struct Head {
+    bus: u16,
+    known: bool,
+    text: Piece<96>,
+    /// What follows the data, while the frame is of the same kind.
+    tail: Option<(Kind, Piece<96>)>,
+}
+
+/// Eight digits of four bytes, the first byte lowest in both: one nibble goes to each byte of the
+/// result.
+#[inline]
+const fn hex_of_4(bytes: u32) -> u64 {
+    const ONES: u64 = 0x0101_0101_0101_0101;
+    let spread = bytes as u64;
+    let spread = (spread | spread << 16) & 0x0000_FFFF_0000_FFFF;
+    let spread = (spread | spread << 8) & 0x00FF_00FF_00FF_00FF;
+    let nibbles = (spread >> 4 & 0x000F_000F_000F_000F) | (spread & 0x000F_000F_000F_000F) << 8;
+    let letters = (nibbles + 6 * ONES) >> 4 & ONES;
+    nibbles + b'0' as u64 * ONES + letters * (b'A' - b'9' - 1) as u64
+}
+
+#[inline]
 fn put_hex(out: &mut Vec<u8>, data: &[u8]) {
-    for &byte in data {
-        out.extend_from_slice(&HEX[usize::from(byte)]);
+    // The data of a classic frame in one go; of a longer one piece by piece.
+    for data in data.chunks(8) {
+        let bytes = match data.first_chunk() {
+            Some(bytes) => u64::from_le_bytes(*bytes),
+            None => data.iter().rev().fold(0, |bytes, &byte| bytes << 8 | u64::from(byte)),
+        };
+        let text = [hex_of_4(bytes as u32).to_le_bytes(), hex_of_4((bytes >> 32) as u32).to_le_bytes()];
+        let end = out.len() + 2 * data.len();
+        out.extend_from_slice(text.as_flattened());
+        out.truncate(end);
     }
 }
 
@@ -96,7 +145,69 @@ fn put_state(out: &mut Vec<u8>, state: Option<State>) {
 
 impl<'a> Json<'a> {
     pub(super) fn new(names: &'a Names) -> Self {
-        Self { out: Vec::with_capacity(2 * super::BLOCK), names, bus: (String::new(), b"\"\"".to_vec()) }
+        Self {
+            out: Vec::with_capacity(2 * super::BLOCK),
+            names,
+            bus: (String::new(), b"\"\"".to_vec()),
+            heads: vec![Head { bus: 0, known: false, text: Piece::EMPTY, tail: None }; 0x800],
+            seconds: (u64::MAX, Piece::EMPTY),
+        }
+    }
+
+    /// `{"t":…` with six decimals, the whole seconds from the frame before where they are the same.
+    #[inline]
+    fn put_start(&mut self, time: Option<Time>) {
+        let nanos = match time {
+            Some(Time(nanos)) if nanos >= 0 && nanos % 1000 == 0 => nanos as u64,
+            _ => {
+                self.out.extend_from_slice(b"{\"t\":");
+                return put_time(&mut self.out, time);
+            }
+        };
+        let seconds = nanos / 1_000_000_000;
+        if self.seconds.0 != seconds {
+            let text = format!("{{\"t\":{seconds}.");
+            self.seconds = (seconds, Piece::new(text.as_bytes()).unwrap_or(Piece::EMPTY));
+        }
+        self.seconds.1.put(&mut self.out);
+        let micros = (nanos % 1_000_000_000 / 1000) as u32;
+        let pair = |number: u32| {
+            let number = (number % 100) as u8;
+            [b'0' + number / 10, b'0' + number % 10]
+        };
+        self.out.extend_from_slice([pair(micros / 10_000), pair(micros / 100), pair(micros)].as_flattened());
+    }
+
+    /// What stands between time and data.
+    #[inline]
+    fn put_head(&mut self, record: &Record, bus: Option<&str>) {
+        let frame = &record.frame;
+        let number = number_of(record);
+        let plain = !frame.extended && frame.kind == FrameKind::Data;
+        let at = frame.id as usize;
+        if plain
+            && let Some(head) = self.heads.get(at)
+            && head.known
+            && head.bus == number
+        {
+            return head.text.put(&mut self.out);
+        }
+        let from = self.out.len();
+        key!(self.out, "bus");
+        self.put_bus(bus);
+        key!(self.out, "id");
+        put_number(&mut self.out, frame.id);
+        let remote = frame.kind == FrameKind::Remote;
+        self.out.extend_from_slice(match (frame.extended, remote) {
+            (false, false) => b",\"ext\":false,\"rtr\":false,\"data\":\"".as_slice(),
+            (false, true) => b",\"ext\":false,\"rtr\":true,\"data\":\"",
+            (true, false) => b",\"ext\":true,\"rtr\":false,\"data\":\"",
+            (true, true) => b",\"ext\":true,\"rtr\":true,\"data\":\"",
+        });
+        let text = self.out.get(from..).and_then(Piece::new);
+        if plain && let (Some(head), Some(text)) = (self.heads.get_mut(at), text) {
+            *head = Head { bus: number, known: true, text, tail: None };
+        }
     }
 
     fn put_bus(&mut self, bus: Option<&str>) {
@@ -112,55 +223,31 @@ impl<'a> Json<'a> {
 }
 
 impl Teller for Json<'_> {
-    fn frame(&mut self, record: &Record, bus: Option<&str>, kind: Option<&Kind>, tracer: &Tracer) {
+    fn frame(&mut self, record: &Record, bus: Option<&str>, kind: &Kind, tracer: &Tracer) {
         let frame = &record.frame;
-        self.out.extend_from_slice(b"{\"t\":");
-        put_time(&mut self.out, record.time);
-        key!(self.out, "bus");
-        self.put_bus(bus);
+        self.put_start(record.time);
+        self.put_head(record, bus);
         let out = &mut self.out;
-        key!(out, "id");
-        put_number(out, frame.id);
-        let remote = frame.kind == FrameKind::Remote;
-        out.extend_from_slice(match (frame.extended, remote) {
-            (false, false) => b",\"ext\":false,\"rtr\":false,\"data\":\"".as_slice(),
-            (false, true) => b",\"ext\":false,\"rtr\":true,\"data\":\"",
-            (true, false) => b",\"ext\":true,\"rtr\":false,\"data\":\"",
-            (true, true) => b",\"ext\":true,\"rtr\":true,\"data\":\"",
-        });
         put_hex(out, frame.data());
-        out.push(b'"');
-        match frame.kind {
-            FrameKind::Remote => {
-                key!(out, "dlc");
-                put_number(out, frame.len());
-            }
-            FrameKind::Fd { .. } => out.extend_from_slice(b",\"fd\":true"),
-            FrameKind::Data | FrameKind::Error => {}
+        let plain = !frame.extended
+            && frame.kind == FrameKind::Data
+            && record.direction.is_none()
+            && !record.loopback
+            && matches!(kind, Kind::Pdo { .. } | Kind::Heartbeat { .. } | Kind::Unknown);
+        let head = self.heads.get_mut(frame.id as usize).filter(|_| plain);
+        if let Some(Head { tail: Some((same, tail)), .. }) = &head
+            && same == kind
+            && tracer.mapped(number_of(record), kind, frame.data()).next().is_none()
+        {
+            return tail.put(out);
         }
-        match record.direction {
-            Some(Direction::Rx) => out.extend_from_slice(b",\"dir\":\"RX\""),
-            Some(Direction::Tx) => out.extend_from_slice(b",\"dir\":\"TX\""),
-            None => {}
-        }
-        if record.loopback {
-            out.extend_from_slice(b",\"loopback\":true");
-        }
-        let name = match (kind, frame.kind) {
-            (Some(kind), _) => name_of(kind),
-            (None, FrameKind::Error) => ERROR_FRAME,
-            (None, _) => UNKNOWN,
-        };
-        key!(out, "kind");
-        put_word(out, NAMES[name]);
-        if let Some(kind) = kind {
-            put_fields(out, kind, frame.data());
-            if let Kind::Pdo { .. } = kind {
-                let number = record.bus.map_or(u16::MAX, |bus| bus.0);
-                put_mapped(out, self.names, kind, tracer, number, frame.data());
-            }
-        }
+        let from = out.len();
+        put_tail(out, record, kind);
+        let constant = !put_mapped(out, self.names, kind, tracer, number_of(record), frame.data());
         out.extend_from_slice(b"}\n");
+        if let Some(head) = head.filter(|_| constant) {
+            head.tail = out.get(from..).and_then(Piece::new).map(|tail| (*kind, tail));
+        }
     }
 
     fn transfer(&mut self, transfer: &Transfer, bus: Option<&str>) {
@@ -232,6 +319,31 @@ impl Teller for Json<'_> {
     fn text(&mut self) -> &mut Vec<u8> {
         &mut self.out
     }
+}
+
+/// What follows the data, the objects of a PDO apart.
+fn put_tail(out: &mut Vec<u8>, record: &Record, kind: &Kind) {
+    let frame = &record.frame;
+    out.push(b'"');
+    match frame.kind {
+        FrameKind::Remote => {
+            key!(out, "dlc");
+            put_number(out, frame.len());
+        }
+        FrameKind::Fd { .. } => out.extend_from_slice(b",\"fd\":true"),
+        FrameKind::Data | FrameKind::Error => {}
+    }
+    match record.direction {
+        Some(Direction::Rx) => out.extend_from_slice(b",\"dir\":\"RX\""),
+        Some(Direction::Tx) => out.extend_from_slice(b",\"dir\":\"TX\""),
+        None => {}
+    }
+    if record.loopback {
+        out.extend_from_slice(b",\"loopback\":true");
+    }
+    key!(out, "kind");
+    put_word(out, NAMES[name_of(frame.kind, kind)]);
+    put_fields(out, kind, frame.data());
 }
 
 /// The fields of a frame's service.
@@ -455,9 +567,9 @@ pub(super) const fn lss_response(response: &lss::Response) -> &'static str {
     }
 }
 
-/// The objects in a PDO whose mapping is known.
-fn put_mapped(out: &mut Vec<u8>, names: &Names, kind: &Kind, tracer: &Tracer, bus: u16, data: &[u8]) {
-    let Kind::Pdo { node, .. } = *kind else { return };
+/// The objects in a PDO whose mapping is known; whether there are any.
+fn put_mapped(out: &mut Vec<u8>, names: &Names, kind: &Kind, tracer: &Tracer, bus: u16, data: &[u8]) -> bool {
+    let Kind::Pdo { node, .. } = *kind else { return false };
     let mut first = true;
     for field in tracer.mapped(bus, kind, data) {
         out.extend_from_slice(if first { b",\"mapped\":[{\"index\":" } else { b",{\"index\":" });
@@ -474,6 +586,7 @@ fn put_mapped(out: &mut Vec<u8>, names: &Names, kind: &Kind, tracer: &Tracer, bu
     if !first {
         out.push(b']');
     }
+    !first
 }
 
 /// The last object.
@@ -489,4 +602,29 @@ pub(super) fn summary(totals: &Totals, out: &mut impl Write) -> io::Result<()> {
         "by_kind": by_kind,
     });
     writeln!(out, "{summary}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hex_and_times() {
+        let every: Vec<u8> = (0..=255).collect();
+        let mut out = Vec::new();
+        put_hex(&mut out, &every);
+        let expected: String = every.iter().map(|byte| format!("{byte:02X}")).collect();
+        assert_eq!(String::from_utf8(out).unwrap(), expected);
+        for (nanos, text) in [
+            (Some(0), "0.000000"),
+            (Some(1_682_489_978_627_243_000), "1682489978.627243"),
+            (Some(1_000_000_001), "1.000000001"),
+            (Some(-1_500_000_000), "-1.500000"),
+            (None, "null"),
+        ] {
+            let mut out = Vec::new();
+            put_time(&mut out, nanos.map(Time));
+            assert_eq!(String::from_utf8(out).unwrap(), text);
+        }
+    }
 }

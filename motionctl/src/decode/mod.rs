@@ -58,8 +58,9 @@ const UNKNOWN: usize = 15;
 const LB2: usize = 16;
 
 /// Place in [`NAMES`].
-const fn name_of(kind: &Kind) -> usize {
+const fn name_of(frame: FrameKind, kind: &Kind) -> usize {
     match kind {
+        _ if matches!(frame, FrameKind::Error) => ERROR_FRAME,
         Kind::Nmt { .. } => 0,
         Kind::Sync { .. } => 1,
         Kind::Time(_) => 2,
@@ -91,10 +92,15 @@ impl Totals {
     }
 }
 
+/// The number of a frame's bus; frames of a capture without buses are on one of their own.
+fn number_of(record: &Record) -> u16 {
+    record.bus.map_or(u16::MAX, |bus| bus.0)
+}
+
 /// Says what a frame is, to a machine or to a person.
 trait Teller {
-    /// One frame. `kind` is `None` of FD frames and error reports.
-    fn frame(&mut self, record: &Record, bus: Option<&str>, kind: Option<&Kind>, tracer: &Tracer);
+    /// One frame. FD frames and error reports are of an unknown kind.
+    fn frame(&mut self, record: &Record, bus: Option<&str>, kind: &Kind, tracer: &Tracer);
     /// A transfer that has ended.
     fn transfer(&mut self, transfer: &Transfer, bus: Option<&str>);
     /// What is written so far.
@@ -192,18 +198,17 @@ fn decode_can<R: Read>(
     stdout: &mut impl Write,
 ) -> Result<(), Stop> {
     let mut buses: Vec<Option<String>> = Vec::new();
-    // Frames of a capture without buses are on one of their own.
-    let number = |record: &Record| record.bus.map_or(u16::MAX, |bus| bus.0);
     loop {
-        let record = match reader.next().map_err(|error| Exit::file(file, &error))? {
+        match reader.next().map_err(|error| Exit::file(file, &error))? {
             None => break,
             Some(Item::Damage(damage)) => {
                 totals.damaged += 1;
                 report(file, &damage);
                 continue;
             }
-            Some(Item::Frame(record)) => *record,
-        };
+            Some(Item::Frame(_)) => {}
+        }
+        let record = reader.record();
         if let Some(bus) = record.bus
             && buses.len() <= usize::from(bus.0)
         {
@@ -213,17 +218,15 @@ fn decode_can<R: Read>(
             }
         }
         let name = |bus: u16| buses.get(usize::from(bus)).and_then(Option::as_deref);
-        let bus = number(&record);
+        let bus = number_of(record);
         let now = record.time.filter(|time| time.0 >= 0).map(motion_io::capture::Time::since_zero);
-        let kind = record.frame.classic().map(|frame| {
-            if record.loopback { tracer.look(bus, &frame) } else { tracer.handle_frame(now, bus, &frame) }
-        });
-        totals.count(match (&kind, record.frame.kind) {
-            (Some(kind), _) => name_of(kind),
-            (None, FrameKind::Error) => ERROR_FRAME,
-            (None, _) => UNKNOWN,
-        });
-        teller.frame(&record, name(bus), kind.as_ref(), tracer);
+        let kind = match record.frame.classic() {
+            Some(frame) if record.loopback => tracer.look(bus, frame),
+            Some(frame) => tracer.handle_frame(now, bus, frame),
+            None => Kind::Unknown,
+        };
+        totals.count(name_of(record.frame.kind, &kind));
+        teller.frame(record, name(bus), &kind, tracer);
         while let Some(transfer) = tracer.poll_event() {
             teller.transfer(&transfer, name(transfer.bus));
         }

@@ -18,7 +18,7 @@ use canopen_master::{Address, NodeId, ds402};
 use motion_io::capture::{FrameKind, Record, Time};
 
 use super::names::{Names, bytes};
-use super::{Teller, Totals};
+use super::{Teller, Totals, number_of};
 
 /// How many values of one object are told, unless its values are states.
 const VALUES: u32 = 4;
@@ -214,12 +214,8 @@ impl<'a> Story<'a> {
     }
 
     /// One line for every frame.
-    fn raw(&mut self, record: &Record, bus: Option<&str>, kind: Option<&Kind>) {
-        let name = match (kind, record.frame.kind) {
-            (Some(kind), _) => super::NAMES[super::name_of(kind)],
-            (None, FrameKind::Error) => "error-frame",
-            (None, _) => "CAN FD",
-        };
+    fn raw(&mut self, record: &Record, bus: Option<&str>, kind: &Kind) {
+        let name = super::NAMES[super::name_of(record.frame.kind, kind)];
         self.repeated();
         self.last.text.clear();
         let time =
@@ -287,10 +283,6 @@ fn who(node: NodeId) -> String {
     format!("node {node}")
 }
 
-fn number_of(record: &Record) -> u16 {
-    record.bus.map_or(u16::MAX, |bus| bus.0)
-}
-
 fn in_ms(from: Option<core::time::Duration>, to: Option<core::time::Duration>) -> String {
     match from.zip(to).and_then(|(from, to)| to.checked_sub(from)) {
         Some(time) if !time.is_zero() => format!(" in {:.1} ms", time.as_secs_f64() * 1e3),
@@ -299,7 +291,7 @@ fn in_ms(from: Option<core::time::Duration>, to: Option<core::time::Duration>) -
 }
 
 impl Teller for Story<'_> {
-    fn frame(&mut self, record: &Record, bus: Option<&str>, kind: Option<&Kind>, tracer: &Tracer) {
+    fn frame(&mut self, record: &Record, bus: Option<&str>, kind: &Kind, tracer: &Tracer) {
         let time = record.time.map(|time| time.0);
         if self.start.is_none()
             && let Some(first) = time.filter(|time| *time >= EPOCH)
@@ -321,7 +313,7 @@ impl Teller for Story<'_> {
             return;
         }
         let frame = &record.frame;
-        let Some(kind) = kind else {
+        if frame.classic().is_none() {
             if frame.kind == FrameKind::Error {
                 self.say(
                     time,
@@ -333,7 +325,7 @@ impl Teller for Story<'_> {
                 self.say(time, bus, "bus", &format!("CAN FD frame {frame:?}"));
             }
             return;
-        };
+        }
         match *kind {
             Kind::Nmt { command, target } => {
                 let whom = if target == 0 { "all nodes".into() } else { format!("node {target}") };
