@@ -194,3 +194,27 @@ fn endpoints_that_are_not_there() {
     }
     drop(bench);
 }
+
+/// Two programs on one bus: one sends on a channel at a period, the others see it, and a second
+/// transmitter is told.
+#[test]
+fn channels_of_can_link() {
+    let net = Bench::new();
+    let sender = ["can", "link", "set", "3", "E2 04", "--period", "0.01", "--can", &net.endpoint];
+    let (_sender, ready) = Running::start(&sender, net.directory.path());
+    assert_eq!(ready["event"], "ready");
+    let list = net.can(&["link", "list", "--for", "0.5"], 0);
+    let channels = list["channels"].as_array().unwrap();
+    assert_eq!(channels.len(), 14);
+    assert_eq!((channels[2]["channel"].as_i64(), channels[2]["data"].as_str()), (Some(3), Some("E204")));
+    assert!(channels[2]["age"].as_f64().unwrap() < 0.5);
+    assert!(channels[0]["data"].is_null());
+    let second = net.can(&["link", "set", "3", "00", "--for", "0.3"], 1);
+    assert_eq!(second["conflict"], true);
+    let once = net.can(&["link", "set", "4", "01", "--for", "0.1"], 0);
+    assert_eq!((once["data"].as_str(), once["conflict"].as_bool()), (Some("01"), Some(false)));
+    for wrong in [["15", "00"], ["1", "0"], ["1", "000102030405060708"]] {
+        let [channel, data] = wrong;
+        assert_eq!(net.run(&["link", "set", channel, data]).status.code(), Some(2), "{wrong:?}");
+    }
+}

@@ -111,6 +111,11 @@ pub(crate) enum Can {
         #[command(flatten)]
         line: CanLine,
     },
+    /// The channels of a CAN Link bus
+    Link {
+        #[command(subcommand)]
+        command: LinkCommand,
+    },
     /// Emergencies as they come
     Emcy {
         #[command(flatten)]
@@ -266,5 +271,37 @@ pub(crate) enum Lss {
     Store {
         #[command(flatten)]
         target: LssTarget,
+    },
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum LinkCommand {
+    /// The newest value of every channel, after listening for a second or `--for` so long
+    List {
+        #[command(flatten)]
+        line: CanLine,
+        #[command(flatten)]
+        stream: Stream,
+    },
+    /// Values as they come
+    Watch {
+        #[command(flatten)]
+        line: CanLine,
+        #[command(flatten)]
+        stream: Stream,
+    },
+    /// Send a value on a channel, once or at a period; status 1 if another device sends on it too
+    Set {
+        /// 1 to 14
+        channel: u8,
+        /// Up to 8 bytes in hex
+        data: String,
+        /// Seconds between two frames, until stopped or for `--for` so long
+        #[arg(long, value_name = "S")]
+        period: Option<f64>,
+        #[command(flatten)]
+        line: CanLine,
+        #[command(flatten)]
+        stream: Stream,
     },
 }

@@ -162,7 +162,8 @@ pub(crate) fn node_id(raw: u8) -> Result<NodeId, Exit> {
     NodeId::new(raw).map_err(|error| Exit::usage(error.to_string()))
 }
 
-fn gone(error: &std::io::Error) -> Exit {
+/// The endpoint does not answer any more.
+pub(super) fn gone(error: &std::io::Error) -> Exit {
     Exit::trouble(format!("the endpoint failed: {error}"))
 }
 
