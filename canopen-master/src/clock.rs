@@ -19,3 +19,10 @@ pub(crate) fn earliest(deadlines: &[Option<Duration>]) -> Option<Duration> {
 pub(crate) fn after_ms(now: Duration, ms: u16) -> Duration {
     now.saturating_add(Duration::from_millis(u64::from(ms)))
 }
+
+/// `time` after `now`. One function on microcontrollers, where the arithmetic is long.
+#[cfg_attr(target_pointer_width = "32", inline(never))]
+#[cfg_attr(not(target_pointer_width = "32"), inline)]
+pub(crate) fn after(now: Duration, time: Duration) -> Duration {
+    now.saturating_add(time)
+}

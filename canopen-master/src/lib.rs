@@ -23,6 +23,7 @@ pub mod master;
 pub mod nmt;
 mod node_set;
 pub mod od;
+pub mod pdo_setup;
 mod ring;
 pub mod scan;
 pub mod sdo;

@@ -72,11 +72,8 @@ impl Hooks for App {
 }
 
 /// One RPDO and one TPDO with up to 4 objects.
-type Both = Pdos<1, 1, 4>;
-
 struct Device<'a> {
-    dictionary: Dictionary<'a, App>,
-    pdos: Both,
+    objects: Objects<'a, App, 1, 1, 4>,
     server: Server,
     client: Client<Vec<u8>>,
 }
@@ -91,22 +88,26 @@ impl<'a> Device<'a> {
             Mapping::new(&[Mapped::new(0x6200, 1, 8), Mapped::new(0x0001, 0, 1), Mapped::new(0x6200, 2, 1)]);
         let inputs = Mapping::new(&[Mapped::new(0x6000, 1, 8)]);
         Self {
-            dictionary: Dictionary::new(TABLE.view(), memory, App::default()).unwrap(),
-            pdos: Pdos::new([PdoSlot::new(rpdo, outputs.unwrap())], [PdoSlot::new(tpdo, inputs.unwrap())]),
+            objects: Objects {
+                dictionary: Dictionary::new(TABLE.view(), memory, App::default()).unwrap(),
+                pdos: Pdos::new(
+                    [PdoSlot::new(rpdo, outputs.unwrap())],
+                    [PdoSlot::new(tpdo, inputs.unwrap())],
+                ),
+            },
             server: Server::new(CHANNEL, NEXT_REQUEST),
             client: Client::new(CHANNEL),
         }
     }
 
     fn run(&mut self) -> (Outcome, Vec<u8>) {
-        let mut objects = Objects { dictionary: &mut self.dictionary, pdos: &mut self.pdos };
         loop {
             if let Some(finished) = self.client.poll_event() {
                 return (finished.outcome, finished.buffer);
             }
             let request = self.client.poll_transmit(Duration::ZERO).unwrap();
-            self.server.handle_frame(Duration::ZERO, &request, &mut objects);
-            let response = self.server.poll_transmit(Duration::ZERO, &mut objects).unwrap();
+            self.server.handle_frame(Duration::ZERO, &request, &mut self.objects);
+            let response = self.server.poll_transmit(Duration::ZERO, &mut self.objects).unwrap();
             self.client.handle_frame(Duration::ZERO, &response);
         }
     }
@@ -157,15 +158,15 @@ fn values_rights_and_limits() {
         assert_eq!(device.write(index, sub, data), Err(refusal), "{index:04X}h:{sub} {data:?}");
     }
     assert_eq!(device.read(0x2003, 0), Err(AbortCode::WRITE_ONLY));
-    assert_eq!(device.dictionary.get::<i16>(Address::new(0x2000, 0)), Ok(-7), "nothing has changed");
-    device.dictionary.hooks.written.clear();
+    assert_eq!(device.objects.dictionary.get::<i16>(Address::new(0x2000, 0)), Ok(-7), "nothing has changed");
+    device.objects.dictionary.hooks.written.clear();
     assert_eq!(device.write(0x2000, 0, &100i16.to_le_bytes()), Ok(()));
     assert_eq!(device.write(0x2001, 0, b"twelve bytes"), Ok(()));
     assert_eq!(device.read(0x2001, 0), Ok(b"twelve bytes".to_vec()));
     assert_eq!(device.write(0x2001, 0, b""), Ok(()));
     assert_eq!(device.read(0x2001, 0), Ok(Vec::new()));
     let written = [0x2000, 0x2001, 0x2001].map(|index| Address::new(index, 0));
-    assert_eq!(device.dictionary.hooks.written, written);
+    assert_eq!(device.objects.dictionary.hooks.written, written);
     let domain: Vec<u8> = (0..200).collect();
     assert_eq!(device.write(0x2004, 0, &domain), Ok(()));
     assert_eq!(device.read(0x2004, 0), Ok(domain));
@@ -176,12 +177,11 @@ fn values_rights_and_limits() {
 fn size_not_indicated() {
     let mut memory = [0; TABLE.memory()];
     let mut device = Device::new(&mut memory);
-    let mut objects = Objects { dictionary: &mut device.dictionary, pdos: &mut device.pdos };
     let request = Frame::standard(0x601, [0x22, 0x00, 0x20, 0, 5, 0, 0xDE, 0xAD]);
-    device.server.handle_frame(Duration::ZERO, &request, &mut objects);
-    let answer = device.server.poll_transmit(Duration::ZERO, &mut objects);
+    device.server.handle_frame(Duration::ZERO, &request, &mut device.objects);
+    let answer = device.server.poll_transmit(Duration::ZERO, &mut device.objects);
     assert_eq!(answer, Some(Frame::standard(0x581, [0x60, 0x00, 0x20, 0, 0, 0, 0, 0])));
-    assert_eq!(device.dictionary.get::<i16>(Address::new(0x2000, 0)), Ok(5));
+    assert_eq!(device.objects.dictionary.get::<i16>(Address::new(0x2000, 0)), Ok(5));
 }
 
 /// CiA 301, 7.5.2.13 and 7.5.2.14.
@@ -194,11 +194,11 @@ fn store_and_restore() {
     device.write(0x2000, 0, &42i16.to_le_bytes()).unwrap();
     device.write(0x2001, 0, b"kept").unwrap();
     assert_eq!(device.write(0x1010, 1, b"save"), Ok(()));
-    let stored = device.dictionary.hooks.stored.clone();
+    let stored = device.objects.dictionary.hooks.stored.clone();
     assert_eq!(stored.len(), 2);
     assert_eq!(device.write(0x1011, 1, b"save"), Err(AbortCode::CANNOT_STORE));
     assert_eq!(device.write(0x1011, 1, b"load"), Ok(()));
-    assert!(device.dictionary.hooks.restored);
+    assert!(device.objects.dictionary.hooks.restored);
 
     let mut memory = [0; TABLE.memory()];
     let mut after = Dictionary::new(TABLE.view(), &mut memory, ()).unwrap();
@@ -256,19 +256,22 @@ fn mapping_at_run_time() {
     assert_eq!(device.write(0x1400, 1, &cob_id(0x2000_0201)), Err(AbortCode::INVALID_VALUE), "29 bits");
     device.write(0x1400, 1, &cob_id(0x333)).unwrap();
 
-    device.pdos.start();
-    device.pdos.handle_frame(Duration::ZERO, &Frame::standard(0x333, [0xFE, 0xFF, 9, 9, 9, 9, 0x77]));
-    assert_eq!(device.pdos.poll_event(&mut device.dictionary), None, "waits for SYNC");
-    device.pdos.handle_sync(None, &device.dictionary);
-    assert!(matches!(device.pdos.poll_event(&mut device.dictionary), Some((0, RpdoEvent::Data(_)))));
-    assert_eq!(device.dictionary.get::<i16>(Address::new(0x6411, 1)), Ok(-2));
-    assert_eq!(device.dictionary.get::<u8>(Address::new(0x6200, 1)), Ok(0x77));
+    device.objects.pdos.start();
+    device.objects.pdos.handle_frame(Duration::ZERO, &Frame::standard(0x333, [0xFE, 0xFF, 9, 9, 9, 9, 0x77]));
+    assert_eq!(device.objects.pdos.poll_event(&mut device.objects.dictionary), None, "waits for SYNC");
+    device.objects.pdos.handle_sync(None, &device.objects.dictionary);
+    assert!(matches!(
+        device.objects.pdos.poll_event(&mut device.objects.dictionary),
+        Some((0, RpdoEvent::Data(_)))
+    ));
+    assert_eq!(device.objects.dictionary.get::<i16>(Address::new(0x6411, 1)), Ok(-2));
+    assert_eq!(device.objects.dictionary.get::<u8>(Address::new(0x6200, 1)), Ok(0x77));
 }
 
 #[test]
 fn process_data() {
     let mut memory = [0; TABLE.memory()];
-    let Device { mut dictionary, mut pdos, .. } = Device::new(&mut memory);
+    let Device { objects: Objects { mut dictionary, mut pdos }, .. } = Device::new(&mut memory);
     let frame = Frame::standard(0x201, [0xA5, 0b10]);
     assert!(!pdos.handle_frame(Duration::ZERO, &frame).is_taken(), "not operational yet");
     assert_eq!(pdos.poll_transmit(Duration::ZERO, &dictionary), None);

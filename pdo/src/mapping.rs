@@ -183,8 +183,9 @@ impl<const N: usize> Mapping<N> {
         }
         let mut rest = payload.word();
         Ok(self.entries().iter().map(move |&entry| {
-            let value = Bits::new(rest, entry.bits);
-            rest = rest.checked_shr(u32::from(entry.bits)).unwrap_or(0);
+            let value = Bits::checked(rest, entry.bits);
+            // Nothing follows an entry of 64 bits.
+            rest = rest.wrapping_shr(entry.bits.into());
             (entry, value)
         }))
     }
@@ -194,8 +195,8 @@ impl<const N: usize> Mapping<N> {
     pub fn pack(&self, mut value: impl FnMut(Entry) -> u64) -> Payload {
         let (mut word, mut offset) = (0, 0u32);
         for &entry in self.entries() {
-            let bits = Bits::new(value(entry), entry.bits).unsigned();
-            word |= bits.checked_shl(offset).unwrap_or(0);
+            let bits = Bits::checked(value(entry), entry.bits).unsigned();
+            word |= bits.wrapping_shl(offset);
             offset += u32::from(entry.bits);
         }
         Payload::new(word, self.bytes())

@@ -105,6 +105,12 @@ impl Bits {
         Self { value: value & mask, bits }
     }
 
+    /// As [`new`](Self::new) for 1…64 bits, which the caller has made sure of.
+    #[inline]
+    pub(crate) const fn checked(value: u64, bits: u8) -> Self {
+        Self { value: value & u64::MAX.wrapping_shr(64u32.wrapping_sub(bits as u32)), bits }
+    }
+
     /// A signed value in `bits` bits: two's complement, higher bits cut off.
     #[must_use]
     #[inline]

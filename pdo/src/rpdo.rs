@@ -46,6 +46,7 @@ pub struct Rpdo {
     config: RpdoConfig,
     /// Taken from `config`; an identifier that no frame has where it is not valid.
     id: u16,
+    synchronous: bool,
     waiting: Option<Payload>,
     ready: Option<Payload>,
     fault: Option<RpdoEvent>,
@@ -61,7 +62,17 @@ impl Rpdo {
     #[must_use]
     pub fn new(config: RpdoConfig) -> Self {
         let id = config.cob_id.standard_id().filter(|_| config.cob_id.is_valid()).unwrap_or(NONE);
-        Self { config, id, waiting: None, ready: None, fault: None, was_too_long: false, deadline: None }
+        let synchronous = config.transmission.is_synchronous();
+        Self {
+            config,
+            id,
+            synchronous,
+            waiting: None,
+            ready: None,
+            fault: None,
+            was_too_long: false,
+            deadline: None,
+        }
     }
 
     /// The parameters.
@@ -87,7 +98,7 @@ impl Rpdo {
     }
 
     #[inline]
-    fn receive(&mut self, now: Duration, payload: Payload) {
+    fn receive(&mut self, now: Duration, mut payload: Payload) {
         let expected = self.config.bytes;
         if payload.len() != expected {
             let error = LengthError { expected, found: payload.len() };
@@ -98,14 +109,14 @@ impl Rpdo {
             if !core::mem::replace(&mut self.was_too_long, true) {
                 self.fault = Some(RpdoEvent::TooLong(error));
             }
+            payload = Payload::new(payload.word(), expected);
         } else {
             self.was_too_long = false;
         }
         if !self.config.timeout.is_zero() {
             self.deadline = Some(now.saturating_add(self.config.timeout));
         }
-        let payload = Payload::new(payload.word(), expected);
-        if self.config.transmission.is_synchronous() {
+        if self.synchronous {
             self.waiting = Some(payload);
         } else {
             self.ready = Some(payload);

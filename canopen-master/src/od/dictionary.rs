@@ -126,7 +126,8 @@ impl<'a, H: Hooks> Dictionary<'a, H> {
             .map_err(|others| if others { AbortCode::NO_SUB_INDEX } else { AbortCode::NO_OBJECT })
     }
 
-    #[inline]
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    #[cfg_attr(not(target_pointer_width = "32"), inline)]
     fn find(&mut self, at: Address) -> Result<(usize, &'a Entry<'a>), AbortCode> {
         let place = self.place(at)?;
         self.last = place;

@@ -343,16 +343,17 @@ fn pack<const M: usize, H: Hooks>(slot: &PdoSlot<M>, dictionary: &Dictionary<'_,
     slot.mapping.pack(|entry| dictionary.bits(entry.at))
 }
 
-/// Dictionary and PDO parameters as a server serves them.
+/// Dictionary and PDO parameters as a server serves them; [`Slave`](crate::slave::Slave) moves the
+/// process data between both.
 #[derive(Debug)]
-pub struct Objects<'o, 'a, H, const R: usize, const T: usize, const M: usize> {
+pub struct Objects<'a, H, const R: usize, const T: usize, const M: usize> {
     /// Everything but 1400h…1BFFh.
-    pub dictionary: &'o mut Dictionary<'a, H>,
+    pub dictionary: Dictionary<'a, H>,
     /// 1400h…1BFFh.
-    pub pdos: &'o mut Pdos<R, T, M>,
+    pub pdos: Pdos<R, T, M>,
 }
 
-impl<H: Hooks, const R: usize, const T: usize, const M: usize> Access for Objects<'_, '_, H, R, T, M> {
+impl<H: Hooks, const R: usize, const T: usize, const M: usize> Access for Objects<'_, H, R, T, M> {
     #[inline]
     fn read(&mut self, at: Address, offset: u32, out: &mut [u8]) -> Result<(usize, Total), AbortCode> {
         match Parameter::of(at) {
@@ -376,7 +377,7 @@ impl<H: Hooks, const R: usize, const T: usize, const M: usize> Access for Object
         }
         // Without indicated size an expedited download brings 4 bytes.
         let cut = if piece.size.is_none() { piece.data.get(..old.as_slice().len()) } else { None };
-        self.pdos.write(parameter, cut.unwrap_or(piece.data), self.dictionary)
+        self.pdos.write(parameter, cut.unwrap_or(piece.data), &self.dictionary)
     }
 
     fn abandon(&mut self, at: Address) {

@@ -1,6 +1,7 @@
 //! Where the data of a client's transfer come from or go to.
 
 use super::AbortCode;
+use super::message::load;
 
 /// The caller's storage of one transfer: handed to the client with the command, handed back with the
 /// outcome.
@@ -36,9 +37,19 @@ pub trait Buffer {
 }
 
 /// Copies from `data` at `offset` what fits, and says how much.
-#[inline]
+#[cfg_attr(target_pointer_width = "32", inline(never))]
+#[cfg_attr(not(target_pointer_width = "32"), inline)]
 pub(crate) fn copy_from(data: &[u8], offset: u32, out: &mut [u8]) -> usize {
     let rest = data.get(offset as usize..).unwrap_or(&[]);
+    // Whole segments and short objects are most of all: copies of known length.
+    if let (Some(from), Ok(to)) = (rest.first_chunk::<7>(), <&mut [u8; 7]>::try_from(&mut *out)) {
+        *to = *from;
+        return 7;
+    }
+    if let (1..=8, Ok(to)) = (rest.len(), <&mut [u8; 8]>::try_from(&mut *out)) {
+        *to = load(rest).to_le_bytes();
+        return rest.len();
+    }
     let len = rest.len().min(out.len());
     if let (Some(out), Some(rest)) = (out.get_mut(..len), rest.get(..len)) {
         out.copy_from_slice(rest);
@@ -48,8 +59,12 @@ pub(crate) fn copy_from(data: &[u8], offset: u32, out: &mut [u8]) -> usize {
 
 #[inline]
 fn copy_to(data: &mut [u8], offset: u32, from: &[u8]) -> Result<(), AbortCode> {
-    let to = data.get_mut(offset as usize..).and_then(|rest| rest.get_mut(..from.len()));
-    to.ok_or(AbortCode::OUT_OF_MEMORY)?.copy_from_slice(from);
+    let rest = data.get_mut(offset as usize..).ok_or(AbortCode::OUT_OF_MEMORY)?;
+    if let (Some(to), Ok(from)) = (rest.first_chunk_mut::<7>(), <&[u8; 7]>::try_from(from)) {
+        *to = *from;
+        return Ok(());
+    }
+    rest.get_mut(..from.len()).ok_or(AbortCode::OUT_OF_MEMORY)?.copy_from_slice(from);
     Ok(())
 }
 
@@ -188,10 +203,7 @@ impl Small {
     #[must_use]
     #[inline]
     pub fn new(bytes: &[u8]) -> Option<Self> {
-        let mut small = Self::EMPTY;
-        copy_to(&mut small.data, 0, bytes).ok()?;
-        small.len = bytes.len() as u8;
-        Some(small)
+        (bytes.len() <= 8).then(|| Self { data: load(bytes).to_le_bytes(), len: bytes.len() as u8 })
     }
 
     /// The bytes.
@@ -211,6 +223,10 @@ impl Buffer for Small {
 
     #[inline]
     fn write(&mut self, offset: u32, data: &[u8]) -> Result<(), AbortCode> {
+        if let (0, Some(small)) = (offset, Self::new(data)) {
+            *self = small;
+            return Ok(());
+        }
         copy_to(&mut self.data, offset, data)?;
         self.len = (offset as usize + data.len()) as u8;
         Ok(())

@@ -410,7 +410,7 @@ fn step_request(open: &mut Open, request: &Request) -> Step {
     match (*request, open.phase) {
         (Request::InitiateDownload { content, .. }, _) => {
             match content {
-                message::Content::Expedited(bytes) => open.push(bytes.as_slice()),
+                message::Content::Expedited(bytes) => open.push(message::first(&bytes.padded(), bytes.len())),
                 message::Content::ExpeditedUnsized(bytes) => open.push(&bytes),
                 message::Content::Segmented(_) => {}
             }
@@ -433,7 +433,7 @@ fn step_request(open: &mut Open, request: &Request) -> Step {
         {
             // The same segment again, before its answer, carries nothing new.
             if !asked {
-                open.push(data.as_slice());
+                open.push(message::first(&data.padded(), data.len()));
             }
             open.phase = Phase::Segments { toggle, asked: true, last };
             Step::Goes
@@ -464,7 +464,7 @@ fn step_response(open: &mut Open, response: &Response) -> Step {
             // The answer to a block upload may be a plain one.
             open.transfer.mode = self::mode(&content);
             match content {
-                message::Content::Expedited(bytes) => open.push(bytes.as_slice()),
+                message::Content::Expedited(bytes) => open.push(message::first(&bytes.padded(), bytes.len())),
                 message::Content::ExpeditedUnsized(bytes) => open.push(&bytes),
                 message::Content::Segmented(_) => {
                     open.phase = Phase::Segments { toggle: false, asked: false, last: false };
@@ -477,7 +477,7 @@ fn step_response(open: &mut Open, response: &Response) -> Step {
             Response::UploadSegment { toggle, last, data },
             Phase::Segments { toggle: next, asked: true, .. },
         ) if upload && toggle == next => {
-            open.push(data.as_slice());
+            open.push(message::first(&data.padded(), data.len()));
             if last {
                 return Step::Ended(Outcome::Done);
             }

@@ -9,6 +9,7 @@ use super::super::message::{ABORT, BlockSegment, Content, Request, Response, SEG
 use super::super::{Address, Buffer};
 use super::segmented::next_piece;
 use super::{Client, Fault, Outcome, State};
+use crate::clock::after;
 
 /// How a block transfer is carried out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -47,7 +48,7 @@ impl<B: Buffer> Client<B> {
     /// The server answers without blocks, which the threshold must have allowed.
     pub(super) fn on_protocol_switch(&mut self, content: Content, threshold: u8, data: &[u8]) {
         let size = match content {
-            Content::Expedited(bytes) => bytes.as_slice().len() as u32,
+            Content::Expedited(bytes) => bytes.len() as u32,
             Content::ExpeditedUnsized(_) => 1,
             Content::Segmented(size) => size.unwrap_or(1),
         };
@@ -88,7 +89,7 @@ impl<B: Buffer> Client<B> {
             self.confirm_block();
         } else {
             // Half the time, so that what the silence cut off can still be asked for.
-            self.deadline = Some(now.saturating_add(self.timeout / 2));
+            self.deadline = Some(after(now, self.timeout / 2));
         }
     }
 
@@ -152,7 +153,7 @@ impl<B: Buffer> Client<B> {
         let sequence = self.sender.push(offset, data.get(..usize::from(len)).unwrap_or(&[]), last);
         if self.sender.is_done() {
             self.state = State::BlockConfirm;
-            self.deadline = Some(now.saturating_add(self.timeout));
+            self.deadline = Some(after(now, self.timeout));
         }
         Some(Frame::standard(self.channel.request, BlockSegment { sequence, last, data }.encode()))
     }

@@ -11,6 +11,7 @@ use pdo::{Frame, Handled};
 use super::block::{Receiver, Sender};
 use super::message::{ABORT, Request, Response, SEGMENT};
 use super::{AbortCode, Address, Buffer, Channel, data_on};
+use crate::clock::after;
 pub use block::Block;
 pub use outcome::{Fault, Finished, Outcome, Refused, SubmitError, Ticket};
 
@@ -274,7 +275,7 @@ impl<B: Buffer> Client<B> {
         if self.ask_again() {
             return;
         }
-        self.expect_late(Some(deadline.saturating_add(self.timeout)));
+        self.expect_late(Some(after(deadline, self.timeout)));
         self.finish(Outcome::TimedOut);
         self.send_abort(AbortCode::TIMED_OUT);
     }
@@ -305,7 +306,7 @@ impl<B: Buffer> Client<B> {
             return None;
         }
         self.tx = None;
-        self.deadline = Some(now.saturating_add(self.timeout));
+        self.deadline = Some(after(now, self.timeout));
         Some(Frame::standard(self.channel.request, tx))
     }
 
@@ -316,7 +317,11 @@ impl<B: Buffer> Client<B> {
     /// The outcome of the transfer and its buffer, once.
     #[inline]
     pub fn poll_event(&mut self) -> Option<Finished<B>> {
-        let State::Ended(outcome) = self.state else { return None };
+        let outcome = match self.state {
+            State::Ended(Outcome::Done(bytes)) => Outcome::Done(bytes),
+            State::Ended(outcome) => outcome,
+            _ => return None,
+        };
         self.state = State::Idle;
         let buffer = self.buffer.take()?;
         Some(Finished { ticket: Ticket(self.ticket), at: self.at, outcome, buffer })
@@ -347,7 +352,7 @@ impl<B: Buffer> Client<B> {
                 self.on_download_begun(sent);
             }
             (Response::UploadSegment { toggle, last, data }, State::UploadSegment { toggle: expected }) => {
-                self.on_upload_segment(expected, toggle, last, data.as_slice());
+                self.on_upload_segment(expected, toggle, last, data);
             }
             (
                 Response::DownloadSegment { toggle },

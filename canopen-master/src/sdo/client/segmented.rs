@@ -1,6 +1,6 @@
 //! Expedited and segmented transfers (CiA 301, 7.2.4.2.2, 7.2.4.2.9).
 
-use super::super::message::{Bytes, Content, Request, SEGMENT};
+use super::super::message::{Bytes, Content, Request, SEGMENT, first, segment};
 use super::super::{AbortCode, Address, Buffer};
 use super::{Client, Fault, Outcome, State};
 
@@ -22,7 +22,7 @@ pub(super) fn begin_download(
         }
         size => Content::Segmented(size),
     };
-    let sent = if let Content::Expedited(bytes) = content { bytes.as_slice().len() as u8 } else { 0 };
+    let sent = if let Content::Expedited(bytes) = content { bytes.len() as u8 } else { 0 };
     Ok((Request::InitiateDownload { at, content }.encode(), sent))
 }
 
@@ -55,7 +55,7 @@ impl<B: Buffer> Client<B> {
     #[inline]
     pub(super) fn on_upload_begun(&mut self, content: Content) {
         match content {
-            Content::Expedited(bytes) => self.take_all(bytes.as_slice()),
+            Content::Expedited(bytes) => self.take_all(first(&bytes.padded(), bytes.len())),
             Content::ExpeditedUnsized(bytes) => self.take_all(&bytes),
             Content::Segmented(size) => {
                 self.size = size;
@@ -79,11 +79,17 @@ impl<B: Buffer> Client<B> {
     }
 
     #[inline]
-    pub(super) fn on_upload_segment(&mut self, expected: bool, toggle: bool, last: bool, bytes: &[u8]) {
+    pub(super) fn on_upload_segment(
+        &mut self,
+        expected: bool,
+        toggle: bool,
+        last: bool,
+        data: Bytes<SEGMENT>,
+    ) {
         if toggle != expected {
             return self.give_up(Fault::Toggle);
         }
-        if !self.take(bytes) {
+        if !self.take(first(&data.padded(), data.len())) {
             return;
         }
         if last {
@@ -148,7 +154,7 @@ impl<B: Buffer> Client<B> {
         let Some((data, len, last)) = self.with_buffer(|buffer| next_piece(buffer, offset, size)) else {
             return;
         };
-        let data = Bytes::masked(data, usize::from(len));
+        let data = segment(data, len);
         self.state = State::DownloadSegment { toggle, sent: len, last };
         self.send(Request::DownloadSegment { toggle, last, data });
     }

@@ -7,7 +7,8 @@ use pdo::Frame;
 use super::super::AbortCode;
 use super::super::block::{Confirmed, Receiver, Sender, is_block_size};
 use super::super::message::{ABORT, BlockSegment, Response, SEGMENT};
-use super::{Access, Server, State};
+use super::{Access, Answer, Server, State};
+use crate::clock::after;
 
 impl Server {
     #[inline(never)]
@@ -16,12 +17,12 @@ impl Server {
         crc: bool,
         size: Option<u32>,
         objects: &mut impl Access,
-    ) -> Result<Response, AbortCode> {
+    ) -> Result<Answer, AbortCode> {
         objects.begin_write(self.at, size)?;
         self.size = size;
         self.receiver = Receiver::new(self.block_size, crc);
         self.state = State::BlockReceive;
-        Ok(Response::InitiateBlockDownload { at: self.at, crc: true, block_size: self.block_size })
+        Ok(Response::InitiateBlockDownload { at: self.at, crc: true, block_size: self.block_size }.encode())
     }
 
     /// Any frame while a sub-block comes in.
@@ -41,7 +42,7 @@ impl Server {
             self.confirm_block(now, objects);
         } else {
             // Half the time, so that what the silence cut off can still be asked for.
-            self.deadline = Some(now.saturating_add(self.timeout / 2));
+            self.deadline = Some(after(now, self.timeout / 2));
         }
     }
 
@@ -77,7 +78,7 @@ impl Server {
             self.state = State::BlockDownloadEnd;
         }
         self.tx = Some(Response::AckBlockDownload { sequence, block_size: self.block_size }.encode());
-        self.deadline = Some(now.saturating_add(self.timeout));
+        self.deadline = Some(after(now, self.timeout));
     }
 
     pub(super) fn end_block_download(
@@ -85,7 +86,7 @@ impl Server {
         unused: u8,
         crc: u16,
         objects: &mut impl Access,
-    ) -> Result<Response, AbortCode> {
+    ) -> Result<Answer, AbortCode> {
         self.held_len = self.held_len.saturating_sub(unused);
         self.check_size(0, true)?;
         let held = self.held;
@@ -95,7 +96,7 @@ impl Server {
         }
         self.flush(true, objects)?;
         self.state = State::Idle;
-        Ok(Response::EndBlockDownload)
+        Ok(Response::EndBlockDownload.encode())
     }
 
     #[inline(never)]
@@ -105,7 +106,7 @@ impl Server {
         block_size: u8,
         threshold: u8,
         objects: &mut impl Access,
-    ) -> Result<Response, AbortCode> {
+    ) -> Result<Answer, AbortCode> {
         if !is_block_size(block_size) {
             return Err(AbortCode::BLOCK_SIZE);
         }
@@ -115,7 +116,7 @@ impl Server {
         self.sender = Sender::new(block_size);
         self.check = crc;
         self.state = State::BlockUploadBegun;
-        Ok(Response::InitiateBlockUpload { at: self.at, crc: true, size: self.size })
+        Ok(Response::InitiateBlockUpload { at: self.at, crc: true, size: self.size }.encode())
     }
 
     /// The next segment of the sub-block.
@@ -132,7 +133,7 @@ impl Server {
         let sequence = self.sender.push(offset, data.get(..usize::from(len)).unwrap_or(&[]), last);
         if self.sender.is_done() {
             self.state = State::BlockConfirm;
-            self.deadline = Some(now.saturating_add(self.timeout));
+            self.deadline = Some(after(now, self.timeout));
         }
         Some(Frame::standard(self.channel.response, BlockSegment { sequence, last, data }.encode()))
     }
@@ -142,12 +143,13 @@ impl Server {
         &mut self,
         sequence: u8,
         block_size: u8,
-    ) -> Result<Option<Response>, AbortCode> {
+    ) -> Result<Option<Answer>, AbortCode> {
         match self.sender.confirm(sequence, block_size) {
             Confirmed::All(_) => {
                 let (unused, crc) = self.sender.end();
                 self.state = State::BlockUploadEnd;
-                Ok(Some(Response::EndBlockUpload { unused, crc: if self.check { crc } else { 0 } }))
+                let crc = if self.check { crc } else { 0 };
+                Ok(Some(Response::EndBlockUpload { unused, crc }.encode()))
             }
             Confirmed::Bytes(_) if !is_block_size(block_size) => Err(AbortCode::BLOCK_SIZE),
             Confirmed::Bytes(bytes) => {

@@ -9,8 +9,9 @@ use core::time::Duration;
 use pdo::{Frame, Handled};
 
 use super::block::{MAX_BLOCK_SIZE, Receiver, Sender, is_block_size};
-use super::message::{Request, Response};
+use super::message::{Request, Response, first};
 use super::{AbortCode, Address, Channel, data_on};
+use crate::clock::after;
 pub use access::{Access, Piece, Total, read_slice};
 
 /// Time that a client has for each next request, unless set (CiA 301 names none).
@@ -19,6 +20,9 @@ pub const NEXT_REQUEST: Duration = Duration::from_secs(1);
 /// Bytes held between frames: what must not be torn (8), and the end of a block download whose
 /// length is only known at last (14).
 const HELD: usize = 14;
+
+/// An encoded [`Response`].
+type Answer = [u8; 8];
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum State {
@@ -186,7 +190,7 @@ impl Server {
                 self.upload_segment(expected, toggle, objects)
             }
             (Request::DownloadSegment { toggle, last, data }, State::Download { toggle: expected }) => {
-                self.download_segment(expected, toggle, last, data.as_slice(), objects)
+                self.download_segment(expected, toggle, last, first(&data.padded(), data.len()), objects)
             }
             (Request::InitiateBlockUpload { at, crc, block_size, threshold }, _) => {
                 self.begin(at, objects);
@@ -227,14 +231,15 @@ impl Server {
         };
         match done {
             Ok(response) => {
-                self.tx = Some(response.encode());
-                self.deadline = (!self.is_idle()).then(|| now.saturating_add(self.timeout));
+                self.tx = Some(response);
+                self.deadline = (!self.is_idle()).then(|| after(now, self.timeout));
             }
             Err(code) => self.abort(code, objects),
         }
     }
 
-    #[inline]
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    #[cfg_attr(not(target_pointer_width = "32"), inline)]
     fn begin(&mut self, at: Address, objects: &mut impl Access) {
         if !self.is_idle() {
             self.replace(objects);
@@ -246,6 +251,7 @@ impl Server {
     }
 
     /// Leaves the transfer under way.
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
     fn replace(&mut self, objects: &mut impl Access) {
         if matches!(self.state, State::Download { .. } | State::BlockReceive | State::BlockDownloadEnd) {
             objects.abandon(self.at);

@@ -1,15 +1,16 @@
 //! Expedited and segmented transfers (CiA 301, 7.2.4.2.2, 7.2.4.2.9).
 
 use super::super::AbortCode;
-use super::super::message::{Bytes, Content, Response, SEGMENT};
-use super::{Access, Piece, Server, State};
+use super::super::message::{Bytes, Content, Response, SEGMENT, first, segment};
+use super::{Access, Answer, Piece, Server, State};
 
 /// What is read and written in one piece.
 const WHOLE: usize = 8;
 
 impl Server {
     /// Reads the beginning of the object, all of it if it is short.
-    #[inline]
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    #[cfg_attr(not(target_pointer_width = "32"), inline)]
     pub(super) fn load(&mut self, objects: &mut impl Access) -> Result<Option<u32>, AbortCode> {
         let mut first = [0; WHOLE];
         let (len, total) = objects.read(self.at, 0, &mut first)?;
@@ -31,14 +32,15 @@ impl Server {
     }
 
     #[inline]
-    pub(super) fn begin_upload(&mut self, objects: &mut impl Access) -> Result<Response, AbortCode> {
+    pub(super) fn begin_upload(&mut self, objects: &mut impl Access) -> Result<Answer, AbortCode> {
         self.load(objects)?;
         Ok(self.answer_upload())
     }
 
     /// The answer that begins an upload: the object itself if it is short.
-    #[inline]
-    pub(super) fn answer_upload(&mut self) -> Response {
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    #[cfg_attr(not(target_pointer_width = "32"), inline)]
+    pub(super) fn answer_upload(&mut self) -> Answer {
         let content = match self.size {
             Some(1..=4) => Content::Expedited(Bytes::new(self.held()).unwrap_or(Bytes::EMPTY)),
             size => {
@@ -46,7 +48,7 @@ impl Server {
                 Content::Segmented(size)
             }
         };
-        Response::InitiateUpload { at: self.at, content }
+        Response::InitiateUpload { at: self.at, content }.encode()
     }
 
     #[inline]
@@ -55,14 +57,14 @@ impl Server {
         expected: bool,
         toggle: bool,
         objects: &mut impl Access,
-    ) -> Result<Response, AbortCode> {
+    ) -> Result<Answer, AbortCode> {
         if toggle != expected {
             return Err(AbortCode::TOGGLE);
         }
         let (data, len, last) = self.next_piece(self.offset, objects)?;
         self.offset = self.offset.saturating_add(u32::from(len));
         self.state = if last { State::Idle } else { State::Upload { toggle: !toggle } };
-        Ok(Response::UploadSegment { toggle, last, data: Bytes::masked(data, usize::from(len)) })
+        Ok(Response::UploadSegment { toggle, last, data: segment(data, len) }.encode())
     }
 
     /// The next piece to upload: up to 7 bytes, their number, and whether no more follow.
@@ -99,11 +101,12 @@ impl Server {
         &mut self,
         content: Content,
         objects: &mut impl Access,
-    ) -> Result<Response, AbortCode> {
+    ) -> Result<Answer, AbortCode> {
         let at = self.at;
         match content {
             Content::Expedited(bytes) => {
-                let data = bytes.as_slice();
+                let padded = bytes.padded();
+                let data = first(&padded, bytes.len());
                 objects.write(at, &Piece { offset: 0, data, last: true, size: Some(data.len() as u32) })?;
             }
             Content::ExpeditedUnsized(data) => {
@@ -115,7 +118,7 @@ impl Server {
                 self.state = State::Download { toggle: false };
             }
         }
-        Ok(Response::InitiateDownload { at })
+        Ok(Response::InitiateDownload { at }.encode())
     }
 
     #[inline]
@@ -126,7 +129,7 @@ impl Server {
         last: bool,
         data: &[u8],
         objects: &mut impl Access,
-    ) -> Result<Response, AbortCode> {
+    ) -> Result<Answer, AbortCode> {
         if toggle != expected {
             return Err(AbortCode::TOGGLE);
         }
@@ -141,11 +144,12 @@ impl Server {
             self.give(data, last, objects)?;
         }
         self.state = if last { State::Idle } else { State::Download { toggle: !toggle } };
-        Ok(Response::DownloadSegment { toggle })
+        Ok(Response::DownloadSegment { toggle }.encode())
     }
 
     /// Whether `more` bytes are as many as the client has indicated.
-    #[inline]
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    #[cfg_attr(not(target_pointer_width = "32"), inline)]
     pub(super) fn check_size(&self, more: usize, last: bool) -> Result<(), AbortCode> {
         let Some(size) = self.size else { return Ok(()) };
         let found = u64::from(self.offset) + u64::from(self.held_len) + more as u64;
@@ -162,7 +166,8 @@ impl Server {
     }
 
     /// Keeps bytes for later; the caller has made sure that there is room.
-    #[inline]
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    #[cfg_attr(not(target_pointer_width = "32"), inline)]
     pub(super) fn hold(&mut self, data: &[u8]) {
         let from = usize::from(self.held_len);
         if let Some(room) = self.held.get_mut(from..from + data.len()) {
@@ -172,7 +177,8 @@ impl Server {
     }
 
     /// Gives the objects what was held.
-    #[inline]
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    #[cfg_attr(not(target_pointer_width = "32"), inline)]
     pub(super) fn flush(&mut self, last: bool, objects: &mut impl Access) -> Result<(), AbortCode> {
         let len = core::mem::take(&mut self.held_len);
         if len == 0 && !last {
@@ -182,7 +188,8 @@ impl Server {
         self.give(held.get(..usize::from(len)).unwrap_or(&[]), last, objects)
     }
 
-    #[inline]
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    #[cfg_attr(not(target_pointer_width = "32"), inline)]
     fn give(&mut self, data: &[u8], last: bool, objects: &mut impl Access) -> Result<(), AbortCode> {
         let offset = self.offset;
         // More than 4 GiB have no size that the protocol could indicate.
