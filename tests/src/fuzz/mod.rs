@@ -1,12 +1,14 @@
 //! What the fuzz targets do with their input, here so that the committed corpora are replayed by an
 //! ordinary test. A finding is a panic: of the code under test, or of an assertion here.
 
+mod canopen;
 mod captures;
 mod device;
 mod frames;
 mod master;
 mod trace;
 
+pub use canopen::{od_ops, sdo_client_ops, sdo_server_ops};
 pub use captures::{capture_asc, capture_candump, capture_columns, capture_lb2, capture_pcap, capture_trc};
 pub use device::device_ops;
 pub use frames::{decode, request, response};
@@ -17,12 +19,15 @@ pub use trace::trace;
 pub type Target = fn(&[u8]);
 
 /// Every target by its name under `fuzz/fuzz_targets` and `fuzz/corpus`.
-pub const TARGETS: [(&str, Target); 12] = [
+pub const TARGETS: [(&str, Target); 15] = [
     ("lb2_decode", decode),
     ("lb2_request", request),
     ("lb2_response", response),
     ("lb2_master_ops", master_ops),
     ("lb2_device_ops", device_ops),
+    ("sdo_client_ops", sdo_client_ops),
+    ("sdo_server_ops", sdo_server_ops),
+    ("od_ops", od_ops),
     ("capture_candump", capture_candump),
     ("capture_asc", capture_asc),
     ("capture_trc", capture_trc),
