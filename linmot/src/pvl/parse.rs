@@ -164,6 +164,7 @@ pub struct Parser {
     info: [u32; INFO_WORDS],
     info_words: usize,
     curve: Option<InfoBlock>,
+    data_read: bool,
     seen_curves: u128,
     seen: [u64; 1024],
 }
@@ -214,6 +215,7 @@ impl Parser {
             info: [0; INFO_WORDS],
             info_words: 0,
             curve: None,
+            data_read: false,
             seen_curves: 0,
             seen: [0; 1024],
         }
@@ -288,8 +290,18 @@ impl Parser {
             if inside || self.place == Place::Outside {
                 self.problem(sink, wrong, Problem::Nesting);
             }
-            if let Place::CurveInfo | Place::CurveData | Place::ParameterRows = self.place {
+            if inside {
                 self.end_block(sink);
+            }
+            if self.place == Place::Curve && !self.data_read {
+                self.problem(
+                    sink,
+                    wrong,
+                    match self.curve {
+                        Some(info) => Problem::Curve(CurveError::Count { said: info.setpoints, found: 0 }),
+                        None => Problem::InfoWords(0),
+                    },
+                );
             }
             self.place = Place::Outside;
         } else if is("StartData") {
@@ -299,6 +311,9 @@ impl Parser {
                     if self.curve.is_none() {
                         self.problem(sink, wrong, Problem::NoInfo);
                     }
+                    if core::mem::replace(&mut self.data_read, true) {
+                        self.problem(sink, wrong, Problem::Nesting);
+                    }
                     (self.place, self.rows, self.columns) = (Place::CurveData, 0, (1, 1));
                 }
                 Place::Unknown => {}
@@ -306,7 +321,12 @@ impl Parser {
             }
         } else if is("StartInfo") {
             match self.place {
-                Place::Curve => (self.place, self.info_words, self.columns) = (Place::CurveInfo, 0, (1, 1)),
+                Place::Curve => {
+                    if self.curve.is_some() {
+                        self.problem(sink, wrong, Problem::Nesting);
+                    }
+                    (self.place, self.info_words, self.columns) = (Place::CurveInfo, 0, (1, 1));
+                }
                 Place::Unknown => {}
                 _ => self.problem(sink, wrong, Problem::Nesting),
             }
@@ -350,6 +370,7 @@ impl Parser {
             self.objects += 1;
         } else if kind.eq_ignore_ascii_case("Curve") {
             (self.place, self.curve_id, self.data_size, self.curve) = (Place::Curve, None, None, None);
+            self.data_read = false;
             self.objects += 1;
         } else {
             self.place = Place::Unknown;
@@ -641,6 +662,11 @@ mod tests {
             with("Parameter", "Oscilloscope"),
             [(3, Severity::Warning, "unknown kind of object, Parameter or Curve expected".into())]
         );
+        let bare = "FileType PVL\nStartObject Curve\nEndObject";
+        assert_eq!(problems(bare), [(3, wrong, "info block of 0 words, 18 expected".into())]);
+        let data = FILE.find("@StartData\n@Col1 Value").unwrap();
+        let without = std::format!("{}@EndObject\n", &FILE[..data]);
+        assert_eq!(problems(&without)[0].2, "curve: the info block says 10 setpoints, 0 are there");
         let cut = &FILE[..FILE.find("000ECC76h").unwrap()];
         assert_eq!(problems(cut), [(34, wrong, "the file ends inside an object".into())]);
         assert_eq!(problems("FileType PVL")[0].2, "the file has no parameter object and no curve");

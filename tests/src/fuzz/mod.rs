@@ -5,6 +5,8 @@ mod canopen;
 mod captures;
 mod device;
 mod frames;
+mod linmot;
+mod linmot_ops;
 mod master;
 mod trace;
 
@@ -12,6 +14,8 @@ pub use canopen::{od_ops, sdo_client_ops, sdo_server_ops};
 pub use captures::{capture_asc, capture_candump, capture_columns, capture_lb2, capture_pcap, capture_trc};
 pub use device::device_ops;
 pub use frames::{decode, request, response};
+pub use linmot::{linmot_parse, linmot_pvl};
+pub use linmot_ops::{linmot_client_ops, linmot_drive_ops};
 pub use master::master_ops;
 pub use trace::trace;
 
@@ -19,7 +23,7 @@ pub use trace::trace;
 pub type Target = fn(&[u8]);
 
 /// Every target by its name under `fuzz/fuzz_targets` and `fuzz/corpus`.
-pub const TARGETS: [(&str, Target); 15] = [
+pub const TARGETS: [(&str, Target); 19] = [
     ("lb2_decode", decode),
     ("lb2_request", request),
     ("lb2_response", response),
@@ -35,6 +39,10 @@ pub const TARGETS: [(&str, Target); 15] = [
     ("capture_pcap", capture_pcap),
     ("capture_lb2", capture_lb2),
     ("trace", trace),
+    ("linmot_pvl", linmot_pvl),
+    ("linmot_parse", linmot_parse),
+    ("linmot_client_ops", linmot_client_ops),
+    ("linmot_drive_ops", linmot_drive_ops),
 ];
 
 /// Takes values from the front of fuzz input; an exhausted input gives zeros.
