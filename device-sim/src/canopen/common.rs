@@ -3,8 +3,8 @@
 use canopen_master::data_type::DataType;
 use canopen_master::lss::Identity;
 
-use super::STORE;
 use super::objects::{Entry, Objects, Rights};
+use super::{LONG_STORE, STORE};
 
 /// PDOs of each direction that a node has.
 pub(super) const PDOS: u16 = 4;
@@ -51,7 +51,7 @@ pub(super) fn objects(device_type: u32, name: &str, identity: Identity) -> Objec
     objects.insert(0x1019, 0, unsigned8(Rights::RW, 0));
     // Configuration date and time (CiA 302-2 compares them at boot).
     objects.insert_all(0x1020, [unsigned32(Rights::RW, 0), unsigned32(Rights::RW, 0)]);
-    objects.insert_all(0x2000, [Entry::domain(STORE)]);
+    objects.insert_all(0x2000, [Entry::domain(STORE), Entry::domain(LONG_STORE)]);
     for number in 0..PDOS {
         for (communication, mapping) in [(0x1400, 0x1600), (0x1800, 0x1A00)] {
             let transmit = communication == 0x1800;

@@ -2,7 +2,7 @@
 //! `canopen-master`; a [`Device`] is what it does. There are a servo drive ([`Ld2000`]), an I/O node
 //! ([`RemoteIo`]) and a node with the objects of any EDS ([`FileNode`]).
 //!
-//! Every node has a store for tests at 2000h:01 and a text longer than four bytes at 100Ah.
+//! Every node has stores for tests at 2000h:01 (64 KiB) and :02 (1 MiB), and a text longer than four bytes at 100Ah.
 
 mod common;
 mod drive;
@@ -27,6 +27,8 @@ pub use objects::{Entry, Objects, Rights};
 
 /// Longest content of 2000h:01, in bytes.
 pub const STORE: usize = 64 * 1024;
+/// Longest content of 2000h:02, for transfers that take long, in bytes.
+pub const LONG_STORE: usize = 1024 * 1024;
 
 /// What a device does with its objects and with time.
 pub trait Device {

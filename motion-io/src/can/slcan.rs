@@ -207,6 +207,18 @@ impl AdapterPort {
         Self { port, adapter: Adapter::default(), start: Instant::now(), frames: VecDeque::new() }
     }
 
+    /// Takes what the host sends and answers it; the number of bytes that came.
+    fn listen(&mut self, timeout: Duration) -> io::Result<usize> {
+        let mut buffer = [0; 512];
+        let len = self.port.receive(&mut buffer, timeout)?;
+        let mut answers = Vec::new();
+        self.adapter.handle_bytes(buffer.get(..len).unwrap_or(&[]), &mut answers, &mut self.frames);
+        if !answers.is_empty() {
+            self.tell(&answers)?;
+        }
+        Ok(len)
+    }
+
     /// Sends to the host. One that does not read has left: it finds the channel closed when it comes back.
     fn tell(&mut self, bytes: &[u8]) -> io::Result<()> {
         match self.port.send(bytes) {
@@ -236,18 +248,19 @@ impl CanPort for AdapterPort {
                 return Ok(Some(Event::Frame(frame)));
             }
             let left = end.saturating_sub(self.start.elapsed());
-            let mut buffer = [0; 512];
-            let len = self.port.receive(&mut buffer, left)?;
-            if len == 0 && self.start.elapsed() >= end {
+            if self.listen(left)? == 0 && self.start.elapsed() >= end {
                 return Ok(None);
             }
-            let mut answers = Vec::new();
-            let bytes = buffer.get(..len).unwrap_or(&[]);
-            self.adapter.handle_bytes(bytes, &mut answers, &mut self.frames);
-            if !answers.is_empty() {
-                self.tell(&answers)?;
-            }
         }
+    }
+
+    fn wait_for_peer(&mut self, timeout: Duration) -> io::Result<bool> {
+        let end = self.start.elapsed().saturating_add(timeout);
+        while self.adapter.channel == Channel::Closed && self.start.elapsed() < end {
+            let left = end.saturating_sub(self.start.elapsed());
+            self.listen(left)?;
+        }
+        Ok(self.adapter.channel != Channel::Closed)
     }
 }
 

@@ -16,6 +16,8 @@ use crate::exit::Exit;
 
 /// Time that a device has for each answer, unless `--timeout` says otherwise.
 const ANSWER: Duration = Duration::from_millis(500);
+/// Where we are the adapter, a host has so long to open its end.
+const PEER: Duration = Duration::from_secs(10);
 /// Time for each step of fastscan: adapters and servers hold answers back for some milliseconds.
 const FASTSCAN_STEP: Duration = Duration::from_millis(25);
 /// Frames that are still to go out when a command is done have so long.
@@ -170,7 +172,11 @@ pub(super) fn gone(error: &std::io::Error) -> Exit {
 impl Session {
     pub(crate) fn open(global: &Global, line: &CanLine) -> Result<Self, Exit> {
         let answer = answer_time(global)?;
-        let port = open(&endpoint(global, line)?).map_err(|error| Exit::trouble(error.to_string()))?;
+        let endpoint = endpoint(global, line)?;
+        let mut port = open(&endpoint).map_err(|error| Exit::trouble(error.to_string()))?;
+        if !port.wait_for_peer(PEER).map_err(|error| gone(&error))? {
+            return Err(Exit::trouble(format!("{endpoint}: nobody has opened the other end")));
+        }
         let config = Config {
             confirm: answer,
             lss: canopen_master::lss::Config { answer, fastscan_step: FASTSCAN_STEP },
