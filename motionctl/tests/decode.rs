@@ -240,3 +240,12 @@ fn the_story_tells_each_thing_once() {
         ]
     );
 }
+
+/// The README shows what the command really says.
+#[test]
+fn the_readme_shows_a_real_story() {
+    let log = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/bring-up.log");
+    let readme = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../README.md")).unwrap();
+    let story = String::from_utf8(Bench::new().run(&["decode", log]).0.stdout).unwrap();
+    assert!(readme.contains(&story), "README.md lacks:\n{story}");
+}

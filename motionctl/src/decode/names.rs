@@ -204,10 +204,22 @@ impl Names {
         }
         match sub_name(at) {
             Some((name, _)) => text.push_str(&format!(", {name}")),
+            None if matches!(index, 0x1600..=0x17FF | 0x1A00..=0x1BFF) => {
+                text.push_str(&format!(", object {sub}"))
+            }
             None if sub > 0 => text.push_str(&format!(" {sub}")),
             None => {}
         }
         text
+    }
+
+    /// The object's name alone, where it has one.
+    pub(super) fn short(&self, node: NodeId, at: Address) -> String {
+        let object = self.object(node, at);
+        match object.split_once(' ') {
+            Some((_, name)) => name.to_owned(),
+            None => object,
+        }
     }
 
     fn data_type(&self, node: NodeId, at: Address) -> Option<DataType> {
@@ -379,7 +391,7 @@ mod tests {
     fn standard_objects_are_in_order_and_have_words() {
         let names = Names::default();
         let node = NodeId::MIN;
-        assert_eq!(names.object(node, Address::new(0x1A01, 2)), "1A01h:02 mapping of TPDO 2 2");
+        assert_eq!(names.object(node, Address::new(0x1A01, 2)), "1A01h:02 mapping of TPDO 2, object 2");
         assert_eq!(names.object(node, Address::new(0x1800, 1)), "1800h:01 TPDO 1, identifier");
         assert_eq!(names.object(node, Address::new(0x2000, 1)), "2000h:01");
         for (at, data, words) in [

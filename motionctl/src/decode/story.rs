@@ -156,16 +156,19 @@ impl<'a> Story<'a> {
             return;
         }
         let mut fields = Vec::new();
-        let mut news = first;
+        let mut mapped = false;
         for field in tracer.mapped(number, kind, frame.data()) {
+            mapped = true;
             let at = field.object.address();
             let raw = field.raw.to_le_bytes();
             let raw = raw.get(..usize::from(field.object.bits).div_ceil(8)).unwrap_or(&raw);
-            news |= self.is_news(number, node, at, raw);
-            fields.push(format!("{} = {}", self.names.object(node, at), self.names.words(node, at, raw)));
+            if self.is_news(number, node, at, raw) || self.moves(number, node, at, raw) || first {
+                fields.push(format!("{} = {}", self.names.short(node, at), self.names.words(node, at, raw)));
+            }
         }
+        let news = first || !fields.is_empty();
         if news {
-            let fields = if fields.is_empty() { bytes(frame.data()) } else { fields.join("; ") };
+            let fields = if mapped { fields.join("; ") } else { bytes(frame.data()) };
             let begins = if first { " begins" } else { "" };
             self.say(time, bus, &who(node), &format!("{name} {pdo}{begins}: {fields}"));
         }
@@ -186,6 +189,22 @@ impl<'a> Story<'a> {
             }
             _ => false,
         }
+    }
+
+    /// Whether a value that is no state changes for the first time: told once, so that it is seen
+    /// which values live.
+    fn moves(&mut self, bus: u16, node: NodeId, at: Address, data: &[u8]) -> bool {
+        if matches!(at.index, ds402::STATUS_WORD | ds402::CONTROL_WORD | ds402::MODE | ds402::MODE_DISPLAY) {
+            return false;
+        }
+        let told = self.objects.entry((bus, node, at, false)).or_default();
+        if told.values == 0 {
+            told.data = data.to_vec();
+            told.values = 1;
+        }
+        let moves = told.values == 1 && told.data != data;
+        told.values += u32::from(moves);
+        moves
     }
 
     fn state(
