@@ -90,7 +90,9 @@ pub fn linmot_parse(data: &[u8]) {
             if let Some(access) = Access::parse(telegram) {
                 assert_eq!(Access::parse(access.encode()), Some(access));
                 if let Some(request) = access.request(false) {
-                    assert_eq!(Access::new(&request), Some(access));
+                    // Bytes of a write that mean nothing to its command are not kept.
+                    let again = Access::new(&request).and_then(|access| access.request(false));
+                    assert_eq!(again, Some(request));
                 }
             }
             if let Some((index, sub, answer)) = Answer::parse(telegram) {
