@@ -29,7 +29,7 @@ fn address(input: &mut Input<'_>) -> Address {
 /// A frame that is mostly well-formed, on the identifier given.
 fn frame(input: &mut Input<'_>, id: u16) -> Frame {
     let mut bytes = [0; 8];
-    let len = if input.u8() % 8 == 0 { input.u8() % 9 } else { 8 };
+    let len = if input.u8().is_multiple_of(8) { input.u8() % 9 } else { 8 };
     bytes[0] = input.u8();
     // Of those that name an object, few would hit one.
     let at = address(input);
@@ -60,16 +60,20 @@ pub fn sdo_client_ops(data: &[u8]) {
     while !input.is_empty() {
         match input.u8() % 8 {
             0 => {
-                let block = Block { block_size: input.u8(), crc: input.u8() % 2 == 0, threshold: input.u8() };
-                options.block = (input.u8() % 4 != 0).then_some(block);
+                let block = Block {
+                    block_size: input.u8(),
+                    crc: input.u8().is_multiple_of(2),
+                    threshold: input.u8(),
+                };
+                options.block = (!input.u8().is_multiple_of(4)).then_some(block);
                 let at = address(&mut input);
-                open = client.upload(at, Vec::new(), &options).map(Some).unwrap_or(open);
+                open = client.upload(at, Vec::new(), &options).map_or(open, Some);
             }
             1 => {
                 let len = input.u8();
                 let data = input.bytes(len).repeat(usize::from(1 + input.u8() % 8));
                 let at = address(&mut input);
-                open = client.download(at, data, &options).map(Some).unwrap_or(open);
+                open = client.download(at, data, &options).map_or(open, Some);
             }
             2 => open.into_iter().for_each(|ticket| client.cancel(ticket)),
             3 => {
@@ -152,7 +156,7 @@ pub fn sdo_server_ops(data: &[u8]) {
         match input.u8() % 8 {
             0 if server.is_idle() => {
                 objects.size = u32::from(input.u16() % 2000);
-                objects.told = input.u8() % 4 != 0;
+                objects.told = !input.u8().is_multiple_of(4);
             }
             1 => {
                 now += Duration::from_millis(u64::from(input.u8()) * 10);
