@@ -205,7 +205,7 @@ impl Names {
         match sub_name(at) {
             Some((name, _)) => text.push_str(&format!(", {name}")),
             None if matches!(index, 0x1600..=0x17FF | 0x1A00..=0x1BFF) => {
-                text.push_str(&format!(", object {sub}"))
+                text.push_str(&format!(", object {sub}"));
             }
             None if sub > 0 => text.push_str(&format!(" {sub}")),
             None => {}
