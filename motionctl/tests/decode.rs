@@ -1,5 +1,6 @@
 //! `motionctl decode`, line by line as its contract says.
 
+#[allow(dead_code, reason = "shared with tests that need more of it")]
 mod common;
 
 use common::Bench;
