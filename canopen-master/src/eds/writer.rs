@@ -69,8 +69,11 @@ fn sections(device: &Device) -> Vec<Section> {
             out.push_object("", object);
         }
     }
-    for section in core::mem::take(&mut out.leftover).into_values() {
-        out.push_counted(&section.name, section.fields.clone());
+    // What no object took, in the order of the file.
+    for section in &device.other {
+        if out.leftover.contains_key(&section.name.to_ascii_uppercase()) {
+            out.push_counted(&section.name, Fields::default());
+        }
     }
     out.list
 }
