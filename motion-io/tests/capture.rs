@@ -225,6 +225,16 @@ fn column_texts() {
     );
 }
 
+/// Found by fuzzing: a length of CAN FD on a frame that is none.
+#[test]
+fn a_remote_frame_of_12_bytes_is_damage() {
+    let good = "  can0  123   [8]  remote request\n";
+    let (_, frames, damage) = read(format!("{good}  can0  123  [12]  remote request 05 06\n").as_bytes());
+    assert_eq!(frames.len(), 1);
+    let [damage] = &damage[..] else { panic!("{damage:?}") };
+    assert!(damage.starts_with("line 2: more bytes than such a frame has"), "{damage}");
+}
+
 #[test]
 fn damaged_lines_are_reported_with_their_number() {
     let long = "x".repeat(600_000);

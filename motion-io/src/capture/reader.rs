@@ -53,11 +53,17 @@ impl TextParser {
 
     #[inline]
     pub(super) fn line(&mut self, line: &[u8], record: &mut Record, buses: &mut Buses) -> Parsed {
-        match self {
+        let parsed = match self {
             Self::Candump(parser) => parser.line(line, record, buses),
             Self::Asc(parser) => parser.line(line, record, buses),
             Self::Trc(parser) => parser.line(line, record, buses),
             Self::Columns(parser) => parser.line(line, record, buses),
+        };
+        match parsed {
+            Parsed::Frame if !record.frame.fits() => {
+                Parsed::Damaged("more bytes than such a frame has, or too large an identifier")
+            }
+            parsed => parsed,
         }
     }
 }

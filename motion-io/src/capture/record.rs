@@ -91,7 +91,9 @@ impl Frame {
         frame.fits().then_some(frame)
     }
 
-    fn fits(&self) -> bool {
+    /// Whether the length and the identifier are those that such a frame may have.
+    #[inline]
+    pub(super) fn fits(&self) -> bool {
         let most = if matches!(self.kind, FrameKind::Fd { .. }) { MAX_DATA } else { 8 };
         let ids = if self.extended || self.kind == FrameKind::Error { 0x1FFF_FFFF } else { 0x7FF };
         usize::from(self.len) <= most && self.id <= ids
