@@ -6,7 +6,7 @@ use std::io::{self, Read};
 
 use super::CaptureError;
 use super::input::Input;
-use super::record::{Bus, Buses, Direction, FrameKind, Record, Time};
+use super::record::{Bus, Buses, Direction, FrameKind, Record, Time, UNFIT};
 
 /// Link types (tcpdump.org, "Link-layer header types").
 pub(super) const LINK_SOCKETCAN: u32 = 227;
@@ -339,7 +339,8 @@ impl Pcap {
             _ => (Cooked::Other, Err("a packet of a link that is no CAN bus")),
         };
         self.number += 1;
-        Ok(Held { number: self.number, content: content.map(|()| record), cooked, paired: false })
+        let content = content.and_then(|()| if record.frame.fits() { Ok(record) } else { Err(UNFIT) });
+        Ok(Held { number: self.number, content, cooked, paired: false })
     }
 
     /// Whether the identifier of a cooked frame is big-endian.

@@ -7,7 +7,7 @@ use super::candump::Candump;
 use super::columns::Columns;
 use super::input::{Input, Line};
 use super::pcap::{Packet, Pcap};
-use super::record::{Bus, Buses, Damage, Place, Record};
+use super::record::{Bus, Buses, Damage, Place, Record, UNFIT};
 use super::trc::Trc;
 use super::{CaptureError, Format};
 
@@ -60,9 +60,7 @@ impl TextParser {
             Self::Columns(parser) => parser.line(line, record, buses),
         };
         match parsed {
-            Parsed::Frame if !record.frame.fits() => {
-                Parsed::Damaged("more bytes than such a frame has, or too large an identifier")
-            }
+            Parsed::Frame if !record.frame.fits() => Parsed::Damaged(UNFIT),
             parsed => parsed,
         }
     }

@@ -78,6 +78,9 @@ pub struct Frame {
     pub(super) data: [u8; MAX_DATA],
 }
 
+/// What a reader says of a frame that is not one of those that [`Frame::new`] makes.
+pub(super) const UNFIT: &str = "more bytes than such a frame has, or too large an identifier";
+
 impl Frame {
     pub(super) const EMPTY: Self =
         Self { id: 0, extended: false, kind: FrameKind::Data, len: 0, data: [0; MAX_DATA] };
