@@ -321,17 +321,17 @@ impl Link {
     /// Values of a channel that came before the last one had been read; stops at 65535.
     #[must_use]
     pub fn overruns(&self, channel: Channel) -> u16 {
-        self.faults(channel, Kind::transmits, false)
+        self.faults(channel, false)
     }
 
     /// Frames of other devices on a channel that this one transmits on; stops at 65535.
     #[must_use]
     pub fn conflicts(&self, channel: Channel) -> u16 {
-        self.faults(channel, Kind::transmits, true)
+        self.faults(channel, true)
     }
 
-    fn faults(&self, channel: Channel, is: fn(Kind) -> bool, wanted: bool) -> u16 {
-        let slot = self.slots.get(channel.position()).filter(|slot| is(slot.kind) == wanted);
+    fn faults(&self, channel: Channel, transmits: bool) -> u16 {
+        let slot = self.slots.get(channel.position()).filter(|slot| slot.kind.transmits() == transmits);
         slot.map_or(0, |slot| slot.faults)
     }
 

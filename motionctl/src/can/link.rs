@@ -9,6 +9,7 @@ use pdo::Frame;
 use serde_json::{Value, json};
 
 use super::cli::{CanLine, LinkCommand, Stream};
+use super::network::STEP;
 use super::session::{duration, endpoint, gone};
 use super::stop_flag;
 use super::value::{bytes, hex};
@@ -18,8 +19,6 @@ use crate::output::Output;
 
 /// How long `list` listens unless told.
 const LISTEN: Duration = Duration::from_secs(1);
-/// Longest step of a stream between two looks at the stop signal.
-const STEP: Duration = Duration::from_millis(100);
 /// A value that is sent once may wait so long for room in the transmit queue.
 const FLUSH: Duration = Duration::from_millis(20);
 

@@ -20,7 +20,7 @@ use crate::exit::Exit;
 use crate::output::Output;
 
 /// The longest step of a stream between two looks at the stop signal.
-const STEP: Duration = Duration::from_millis(100);
+pub(super) const STEP: Duration = Duration::from_millis(100);
 /// Nodes that send no heartbeat have so long to show their state when asked.
 const SHOW: Duration = Duration::from_millis(100);
 
