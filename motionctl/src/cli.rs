@@ -52,9 +52,11 @@ pub(crate) enum Color {
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     /// The application example of manual A 6.11 on a virtual controller, end to end
-    Demo,
+    Demo(crate::demo::Demo),
     /// A soft MotionController: LB2 on its serial endpoints, axes, program, until stopped
     Run(crate::run::cli::Run),
+    /// Positions, velocities, accelerations and errors of a recording as SVG
+    Plot(crate::plot::Plot),
     /// One virtual device on the named endpoints
     Sim {
         #[command(subcommand)]

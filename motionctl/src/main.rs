@@ -18,6 +18,7 @@ mod lb2;
 mod linmot;
 mod output;
 mod params;
+mod plot;
 mod run;
 mod sim;
 mod storage;
@@ -31,7 +32,8 @@ fn main() -> ExitCode {
     let cli = Cli::parse();
     let out = output::Output::new(&cli.global);
     let done = match cli.command {
-        Command::Demo => demo::run(&out),
+        Command::Demo(arguments) => demo::run(&out, &arguments),
+        Command::Plot(arguments) => plot::run(&out, &arguments),
         Command::Run(arguments) => run::run(&out, &arguments),
         Command::Sim { command } => sim::run(&out, &cli.global, &command),
         Command::Can { command } => can::run(&out, &cli.global, &command),

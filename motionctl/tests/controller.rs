@@ -6,18 +6,38 @@ mod common;
 use common::{Bench, edit};
 
 #[test]
-fn the_demo_verifies_the_values_after_the_power_cycle() {
+fn the_demo_goes_from_identification_to_the_target() {
     let bench = Bench::new();
     bench
-        .run(&["demo"])
+        .run(&["demo", "--plot", "F.svg", "--record", "F.csv"])
         .ends(0)
-        .says("15 of 15 values survived")
-        .says("verified: [642] V max., Axis 1 = 3276800");
+        .says("20 of 20 values survived")
+        .says("verified: [642] V max., Axis 1 = 3276800")
+        .says("CAN 2: OK")
+        .says("Nd01  1   1    0192h    SD03  00h")
+        .says("actual position 1000000")
+        .says("failures: none");
+    let drawing = std::fs::read_to_string(bench.path("F.svg")).unwrap();
+    assert!(drawing.starts_with("<svg") && drawing.contains("following error in units"));
+    let drawn = bench.run(&["plot", "F.csv", "--from", "0.9", "-o", "G.svg", "--json"]).ends(0).json();
+    assert!(drawn["samples"].as_u64().unwrap() > 400, "{drawn}");
+    assert!(bench.path("G.svg").exists());
+    bench.run(&["plot", "F.csv", "--axis", "2"]).ends(1).says("nothing of these axes");
+    bench.run(&["plot", "missing.csv"]).ends(5).says("missing.csv");
+
     let json = bench.run(&["demo", "--json"]).ends(0).json();
     assert_eq!(
         (json["verified"].as_bool(), json["parameters"][9]["value"].as_i64()),
         (Some(true), Some(3_276_800))
     );
+    let position = &json["position"];
+    let late = position["seconds"].as_f64().unwrap() - position["analytic_seconds"].as_f64().unwrap();
+    assert!(late.abs() <= position["cycle_seconds"].as_f64().unwrap(), "{position}");
+    assert_eq!((position["actual"].as_i64(), position["at_target"].as_bool()), (Some(1_000_000), Some(true)));
+    // The drive followed the speed set value.
+    let velocity = json["jog"]["velocity"].as_i64().unwrap();
+    assert!((65_000..66_000).contains(&velocity), "{velocity}");
+    assert_eq!(json["bus"]["guard_requests"], json["bus"]["guard_replies"]);
 }
 
 #[test]

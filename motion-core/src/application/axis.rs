@@ -35,6 +35,9 @@ pub struct AxisStatus {
     pub nominal_position: i32,
     /// Nominal velocity, user measuring units per second.
     pub nominal_velocity: f64,
+    /// Nominal acceleration, user measuring units per second squared; 0 where no set values are
+    /// generated (Signals, Ramps).
+    pub nominal_acceleration: f64,
     /// Nominal minus actual position, DeltaS (4.3.2).
     pub deviation: i32,
     /// `actual = nominal`: within the tolerance window of a position reached (`[708]`, `[714]`).

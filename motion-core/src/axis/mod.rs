@@ -268,6 +268,7 @@ impl Axis {
             },
             nominal_position: nominal,
             nominal_velocity: if follows { self.velocity } else { generator.velocity },
+            nominal_acceleration: if follows { 0.0 } else { generator.acceleration },
             deviation,
             at_target: self.at_target,
             in_velocity,

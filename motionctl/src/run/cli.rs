@@ -12,4 +12,7 @@ pub(crate) struct Run {
     /// Stop after this many seconds
     #[arg(long = "for", value_name = "SECONDS")]
     pub(crate) duration: Option<f64>,
+    /// Write what the activated axes do, a line a control cycle and axis, as `plot` reads it
+    #[arg(long, value_name = "F.csv")]
+    pub(crate) record: Option<PathBuf>,
 }

@@ -23,6 +23,7 @@ use motion_io::port::{Role, open};
 use crate::can::stop_flag;
 use crate::exit::Exit;
 use crate::output::Output;
+use crate::plot::{Recorder, Sample};
 use crate::storage::FileStorage;
 use buses::{Bus, Devices};
 use config::{BusName, ComPort, Config};
@@ -44,16 +45,20 @@ pub(crate) fn run(out: &Output, arguments: &cli::Run) -> Result<(), Exit> {
         None => None,
     };
     let stop = stop_flag()?;
-    match &config.controller.state {
+    let recorder = arguments.record.as_deref().map(Recorder::create).transpose()?;
+    let ended = match &config.controller.state {
         Some(directory) => {
             let name = directory.display().to_string();
             std::fs::create_dir_all(directory).map_err(|error| Exit::file(&name, &error))?;
             let storage =
                 FileStorage::open(&directory.join("flash.bin")).map_err(|error| Exit::file(&name, &error))?;
-            control(out, &config, storage, limit, &stop)
+            control(out, &config, storage, limit, &stop, recorder.as_ref())
         }
-        None => control(out, &config, vec![0xFF; STORAGE_LEN], limit, &stop),
-    }
+        None => control(out, &config, vec![0xFF; STORAGE_LEN], limit, &stop, recorder.as_ref()),
+    };
+    // What was recorded is kept whatever ended the run.
+    let recorded = recorder.map_or(Ok(()), Recorder::finish);
+    ended.and(recorded)
 }
 
 /// Sets the configuration's parameters, which must pass the loader.
@@ -83,6 +88,7 @@ fn control(
     storage: impl Storage,
     limit: Option<Duration>,
     stop: &AtomicBool,
+    recorder: Option<&Recorder>,
 ) -> Result<(), Exit> {
     let model = config.model()?;
     let mut controller = Controller::power_on(model, storage, vec![0; BANK_LEN]);
@@ -139,9 +145,13 @@ fn control(
         }
         controller.advance(now.saturating_sub(before)).map_err(|error| Exit::trouble(error.to_string()))?;
         before = now;
+        let activated = usize::try_from(controller.working().at(0, 0)).unwrap_or(0);
         for axis in 0..6 {
             if let Some(status) = controller.axis_status(axis) {
                 report.axis(now, axis, status);
+                if let Some(recorder) = recorder.filter(|_| axis < activated) {
+                    recorder.put(Sample::new(now, axis as u8 + 1, status));
+                }
             }
         }
         let total = controller.failures().total();

@@ -1,5 +1,5 @@
-//! `motionctl demo`: the parameter part of the application example of manual A 6.11, on a virtual
-//! controller behind a real pseudo-terminal.
+//! The parameter part of the example: a virtual controller behind a real pseudo-terminal is configured
+//! over LB2, and keeps what it was told.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 use std::path::{Path, PathBuf};
@@ -11,7 +11,7 @@ use motion_core::{Controller, Model, STORAGE_LEN};
 use motion_io::endpoint::{Endpoint, Settings};
 use motion_io::lb2::{Client, TIMES, serve};
 use motion_io::port::{Role, open};
-use serde_json::json;
+use serde_json::{Value, json};
 use std::sync::Arc;
 
 use crate::exit::Exit;
@@ -19,8 +19,9 @@ use crate::output::Output;
 
 /// The settings of 6.11, in an order that the loader accepts as a whole: inputs 2…6 inactive, two axes
 /// activated, axis 2 without control, input and output 1 on the CAN bus; then "at least" V max. for
-/// 3000 rpm, t max. acceleration 0.5 s and the jog velocities (which the manual leaves to the user).
-const SETTINGS: [(u16, i32); 15] = [
+/// 3000 rpm, t max. acceleration 0.5 s and the jog velocities; and the control parameters that the
+/// manual leaves to the user: KSP 20/s, a tolerance of 100 units, following errors of half a turn.
+const SETTINGS: [(u16, i32); 20] = [
     (108, 0),
     (109, 0),
     (110, 0),
@@ -36,7 +37,20 @@ const SETTINGS: [(u16, i32); 15] = [
     (762, 655_360),
     (768, 65_536),
     (774, 655_360),
+    (648, 200),
+    (708, 100),
+    (714, 100),
+    (696, 32_768),
+    (702, 32_768),
 ];
+
+/// What came of it.
+pub(super) struct Configured {
+    /// The controller's non-volatile memory.
+    pub(super) storage: Vec<u8>,
+    pub(super) model: u16,
+    pub(super) document: Value,
+}
 
 /// A virtual controller that runs behind a pseudo-terminal.
 struct Running {
@@ -79,11 +93,10 @@ fn client(link: &Path) -> Result<Client, Exit> {
     Ok(Client::new(port, TIMES, 2))
 }
 
-pub(crate) fn run(out: &Output) -> Result<(), Exit> {
+pub(super) fn configure(out: &Output) -> Result<Configured, Exit> {
     let directory = tempfile::tempdir().map_err(|error| Exit::file("temporary directory", &error))?;
     let link: PathBuf = directory.path().join("com2");
     let running = Running::power_on(vec![0xFF; STORAGE_LEN], &link)?;
-    out.say("Application example of manual A 6.11: one axis, LD 2000 on CAN 2.");
     out.say(&format!("A virtual GEL 8230 is on, LB2 at {} (19200 baud, 8E1).", link.display()));
 
     let mut controller = client(&link)?;
@@ -92,16 +105,7 @@ pub(crate) fn run(out: &Output) -> Result<(), Exit> {
     out.say(&format!("identify: GEL {model}, {axes} axes, operating system {version}"));
 
     for (index, value) in SETTINGS {
-        let entry = get(index).ok_or_else(|| Exit::check(format!("there is no parameter [{index:03}]")))?;
-        let old = controller.read_parameter(index)?;
-        let (code, text) = controller.write_parameter(index, value)?;
-        if code.is_error() {
-            return Err(Exit::refused(format!("{entry}: {text}")));
-        }
-        let values = Values::factory();
-        let (old, new) = (entry.format(old, &values), entry.format(value, &values));
-        let remark = if code.is_warning() { format!("  ({text})") } else { String::new() };
-        out.say(&format!("set: {entry}: {old} -> {new} {}{remark}", entry.unit()));
+        set(out, &mut controller, index, value)?;
     }
     if let Some(index) = controller.call_loader()? {
         return Err(Exit::refused(format!("the loader refused parameter [{index:03}]")));
@@ -121,7 +125,7 @@ pub(crate) fn run(out: &Output) -> Result<(), Exit> {
         let found = controller.read_parameter(index)?;
         let Some(entry) = get(index) else { continue };
         let verified = found == value;
-        wrong += u32::from(!verified);
+        wrong += usize::from(!verified);
         let text = entry.format(found, &Values::factory()).to_string();
         let verdict = if verified { "verified" } else { "WRONG" };
         out.say(&format!("{verdict}: {entry} = {text} {}", entry.unit()));
@@ -130,17 +134,28 @@ pub(crate) fn run(out: &Output) -> Result<(), Exit> {
             "verified": verified,
         }));
     }
-    running.power_off()?;
+    let storage = running.power_off()?;
+    if wrong > 0 {
+        return Err(Exit::check(format!("{wrong} values were lost")));
+    }
+    out.say(&format!("{0} of {0} values survived the power cycle", SETTINGS.len()));
     let document = json!({
-        "model": model, "axes": axes, "os_version": version.to_string(), "verified": wrong == 0,
-        "parameters": list,
+        "model": model, "axes": axes, "os_version": version.to_string(), "verified": true, "parameters": list,
     });
-    out.document(document, || {
-        out.say(&format!(
-            "{} of {} values survived the power cycle",
-            SETTINGS.len() as u32 - wrong,
-            SETTINGS.len()
-        ));
-    });
-    if wrong == 0 { Ok(()) } else { Err(Exit::check(format!("{wrong} values were lost"))) }
+    Ok(Configured { storage, model, document })
+}
+
+/// Writes one parameter, telling what it was.
+fn set(out: &Output, controller: &mut Client, index: u16, value: i32) -> Result<(), Exit> {
+    let entry = get(index).ok_or_else(|| Exit::check(format!("there is no parameter [{index:03}]")))?;
+    let old = controller.read_parameter(index)?;
+    let (code, text) = controller.write_parameter(index, value)?;
+    if code.is_error() {
+        return Err(Exit::refused(format!("{entry}: {text}")));
+    }
+    let values = Values::factory();
+    let (old, new) = (entry.format(old, &values), entry.format(value, &values));
+    let remark = if code.is_warning() { format!("  ({text})") } else { String::new() };
+    out.say(&format!("set: {entry}: {old} -> {new} {}{remark}", entry.unit()));
+    Ok(())
 }
