@@ -1,8 +1,11 @@
-//! Deadlines, shared so that a small target holds their arithmetic once.
+//! Deadlines, shared so that a small target holds their arithmetic once: there each of these is one
+//! function, elsewhere they are a few instructions in place.
 
 use core::time::Duration;
 
 /// The earlier of two deadlines, of those there are.
+#[cfg_attr(target_pointer_width = "32", inline(never))]
+#[cfg_attr(not(target_pointer_width = "32"), inline)]
 pub(crate) fn earlier(one: Option<Duration>, other: Option<Duration>) -> Option<Duration> {
     match (one, other) {
         (Some(one), Some(other)) => Some(if one < other { one } else { other }),
@@ -15,14 +18,29 @@ pub(crate) fn earliest(deadlines: &[Option<Duration>]) -> Option<Duration> {
     deadlines.iter().fold(None, |earliest, deadline| earlier(earliest, *deadline))
 }
 
+/// Whether a deadline, if there is one, has come.
+#[cfg_attr(target_pointer_width = "32", inline(never))]
+#[cfg_attr(not(target_pointer_width = "32"), inline)]
+pub(crate) fn is_due(deadline: Option<Duration>, now: Duration) -> bool {
+    deadline.is_some_and(|deadline| now >= deadline)
+}
+
 /// `ms` milliseconds after a moment.
-pub(crate) fn after_ms(now: Duration, ms: u16) -> Duration {
+#[cfg_attr(target_pointer_width = "32", inline(never))]
+#[cfg_attr(not(target_pointer_width = "32"), inline)]
+pub(crate) fn after_ms(now: Duration, ms: u32) -> Duration {
     now.saturating_add(Duration::from_millis(u64::from(ms)))
 }
 
-/// `time` after `now`. One function on microcontrollers, where the arithmetic is long.
+/// `time` after `now`.
 #[cfg_attr(target_pointer_width = "32", inline(never))]
 #[cfg_attr(not(target_pointer_width = "32"), inline)]
 pub(crate) fn after(now: Duration, time: Duration) -> Duration {
     now.saturating_add(time)
+}
+
+/// The next moment of a grid after one that has come; those that were missed are not made up for.
+pub(crate) fn next(last: Duration, period: Duration, now: Duration) -> Duration {
+    let next = after(last, period);
+    if is_due(Some(next), now) { after(now, period) } else { next }
 }

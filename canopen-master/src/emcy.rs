@@ -6,6 +6,8 @@ use core::time::Duration;
 
 use pdo::{Frame, NodeId, cob};
 
+use crate::clock::{after, is_due};
+
 /// An emergency error code. Others may add codes, so any value is one.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub struct ErrorCode(pub u16);
@@ -303,13 +305,13 @@ impl<const N: usize> Producer<N> {
 
     /// The emergency that may be sent now.
     pub fn poll_transmit(&mut self, now: Duration) -> Option<Emergency> {
-        if self.len == 0 || now < self.allowed {
+        if !is_due(self.poll_timeout(), now) {
             return None;
         }
         let first = *self.waiting.first()?;
         self.waiting.rotate_left(1);
         self.len -= 1;
-        self.allowed = now.saturating_add(self.inhibit);
+        self.allowed = after(now, self.inhibit);
         Some(first)
     }
 

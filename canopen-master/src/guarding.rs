@@ -8,6 +8,7 @@ use core::time::Duration;
 use embedded_can::{Id, StandardId};
 use pdo::{Frame, NodeId, cob};
 
+use crate::clock::{self, after_ms, earlier, is_due};
 use crate::nmt::State;
 
 /// Time between two requests to one node (decision 16).
@@ -109,24 +110,21 @@ impl Guard {
 
     /// When [`handle_timeout`](Self::handle_timeout) has something to do.
     #[must_use]
-    pub fn poll_timeout(&self) -> Duration {
-        if self.lost { self.next } else { self.next.min(self.life_end()) }
+    pub fn poll_timeout(&self) -> Option<Duration> {
+        earlier(Some(self.next), self.life_end())
     }
 
     /// Returns whether a request is due now, and whether the node has been lost by now.
     pub fn handle_timeout(&mut self, now: Duration) -> (bool, Option<Event>) {
         let mut event = None;
-        if !self.lost && now >= self.life_end() {
+        if is_due(self.life_end(), now) {
             self.lost = true;
             event = Some(Event::Lost);
         }
-        let due = now >= self.next;
+        let due = is_due(Some(self.next), now);
         if due {
             self.asked = true;
-            self.next = self.next.saturating_add(self.config.period());
-            if self.next <= now {
-                self.next = now.saturating_add(self.config.period());
-            }
+            self.next = clock::next(self.next, self.config.period(), now);
         }
         (due, event)
     }
@@ -173,8 +171,9 @@ impl Guard {
         core::mem::replace(&mut self.lost, false).then_some(Event::Back)
     }
 
-    fn life_end(&self) -> Duration {
-        self.last.saturating_add(self.config.life_time())
+    /// `None` once it is lost.
+    fn life_end(&self) -> Option<Duration> {
+        (!self.lost).then(|| after_ms(self.last, self.config.life_time_ms()))
     }
 }
 
@@ -209,14 +208,14 @@ impl Slave {
     pub fn handle_request(&mut self, now: Duration, state: State) -> (Frame, Option<Event>) {
         let byte = (state as u8) | if self.toggle { 0x80 } else { 0 };
         self.toggle = !self.toggle;
-        self.life_end = self.config.map(|config| now.saturating_add(config.life_time()));
+        self.life_end = self.config.map(|config| after_ms(now, config.life_time_ms()));
         let back = core::mem::replace(&mut self.lost, false).then_some(Event::Back);
         (Frame::standard(cob::ERROR_CONTROL + u16::from(self.node.raw()), [byte]), back)
     }
 
     /// Returns [`Event::Lost`] when the life time has passed without a request.
     pub fn handle_timeout(&mut self, now: Duration) -> Option<Event> {
-        if self.life_end.is_some_and(|end| now >= end) {
+        if is_due(self.life_end, now) {
             self.life_end = None;
             self.lost = true;
             return Some(Event::Lost);
@@ -248,7 +247,7 @@ mod tests {
         assert_eq!(request(NODE).unwrap().to_can::<Frame>(), request(NODE));
         for (step, expected) in [0x7F, 0xFF, 0x7F, 0xFF].into_iter().enumerate() {
             let now = ms(100 * step as u64);
-            assert_eq!(guard.poll_timeout(), now);
+            assert_eq!(guard.poll_timeout(), Some(now));
             assert_eq!(guard.handle_timeout(now), (true, None));
             assert_eq!(guard.handle_timeout(now), (false, None), "spurious");
             let (answer, event) = slave.handle_request(now, State::PreOperational);

@@ -4,7 +4,7 @@ use core::time::Duration;
 
 use pdo::{Frame, NodeId, cob};
 
-use crate::clock::after_ms;
+use crate::clock::{self, after_ms, is_due};
 use crate::nmt::State;
 
 /// Sends a node's state every so often.
@@ -20,7 +20,7 @@ impl Producer {
     /// A producer that first sends one period after `now`; a period of 0 ms is off.
     #[must_use]
     pub fn new(node: NodeId, time_ms: u16, now: Duration) -> Self {
-        Self { node, time_ms, next: after_ms(now, time_ms) }
+        Self { node, time_ms, next: after_ms(now, time_ms.into()) }
     }
 
     /// The period in ms, 0 = off.
@@ -36,13 +36,10 @@ impl Producer {
 
     /// The heartbeat, if one is due. Periods that were missed are not made up for.
     pub fn poll_transmit(&mut self, now: Duration, state: State) -> Option<Frame> {
-        if self.time_ms == 0 || now < self.next {
+        if !is_due(self.poll_timeout(), now) {
             return None;
         }
-        self.next = after_ms(self.next, self.time_ms);
-        if self.next <= now {
-            self.next = after_ms(now, self.time_ms);
-        }
+        self.next = clock::next(self.next, Duration::from_millis(self.time_ms.into()), now);
         Some(Frame::standard(cob::ERROR_CONTROL + u16::from(self.node.raw()), [state as u8]))
     }
 
@@ -107,7 +104,7 @@ impl Consumer {
 
     /// Tells once when the consumer time has passed.
     pub fn handle_timeout(&mut self, now: Duration) -> Option<Event> {
-        if self.poll_timeout().is_none_or(|end| now < end) {
+        if !is_due(self.poll_timeout(), now) {
             return None;
         }
         self.lost = true;
@@ -117,7 +114,7 @@ impl Consumer {
     /// When the consumer time ends; `None` = not watching.
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Duration> {
-        (self.active && !self.lost).then(|| after_ms(self.last, self.time_ms))
+        (self.active && !self.lost).then(|| after_ms(self.last, self.time_ms.into()))
     }
 }
 

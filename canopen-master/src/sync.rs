@@ -4,6 +4,8 @@ use core::time::Duration;
 
 use pdo::{Frame, cob};
 
+use crate::clock::{self, after, is_due};
+
 /// Time between two SYNCs of a master (decision 16).
 pub const PERIOD: Duration = Duration::from_millis(10);
 
@@ -67,13 +69,10 @@ impl Producer {
 
     /// The SYNC, if one is due. The grid is kept; SYNCs that were missed are not made up for.
     pub fn poll_transmit(&mut self, now: Duration) -> Option<Frame> {
-        if now < self.next {
+        if !is_due(Some(self.next), now) {
             return None;
         }
-        self.next = self.next.saturating_add(self.period);
-        if self.next <= now {
-            self.next = now.saturating_add(self.period);
-        }
+        self.next = clock::next(self.next, self.period, now);
         self.last = Some(now);
         if self.overflow == 0 {
             return Some(Frame::standard(cob::SYNC, []));
@@ -91,7 +90,7 @@ impl Producer {
     /// Whether synchronous PDOs may be sent now: the window after the last SYNC is open.
     #[must_use]
     pub fn window_is_open(&self, now: Duration) -> bool {
-        self.last.is_some_and(|last| self.window.is_zero() || now < last.saturating_add(self.window))
+        self.last.is_some_and(|last| self.window.is_zero() || !is_due(Some(after(last, self.window)), now))
     }
 }
 
@@ -163,8 +162,7 @@ impl Consumer {
             return Some(Event::Length { expected, found: frame.len() as u8 });
         }
         if !self.period.is_zero() {
-            let limit = self.period.saturating_add(self.period / 2);
-            self.deadline = Some(now.saturating_add(limit));
+            self.deadline = Some(after(now, after(self.period, self.period / 2)));
         }
         let &[found] = frame.data() else { return Some(Event::Sync { counter: None }) };
         let before = self.counter.replace(found);
@@ -177,7 +175,7 @@ impl Consumer {
 
     /// Tells when SYNC has stopped.
     pub fn handle_timeout(&mut self, now: Duration) -> Option<Event> {
-        self.deadline.is_some_and(|deadline| now >= deadline).then(|| {
+        is_due(self.deadline, now).then(|| {
             self.deadline = None;
             self.counter = None;
             Event::Lost

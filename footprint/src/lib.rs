@@ -3,6 +3,8 @@
 
 use core::hint::black_box;
 
+use pdo::Frame;
+
 /// None of the programs can panic; the linker drops this where that is so.
 #[panic_handler]
 fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
@@ -17,4 +19,9 @@ pub fn wire() -> &'static [u8] {
 /// A time as it might come from a timer.
 pub fn now() -> core::time::Duration {
     core::time::Duration::from_secs(black_box(0))
+}
+
+/// A frame as it might come from a CAN controller.
+pub fn received() -> Frame {
+    black_box(Frame::standard(0, [0; 8]))
 }

@@ -4,6 +4,8 @@ use core::fmt;
 
 use embedded_can::{ExtendedId, Id, StandardId};
 
+use crate::Payload;
+
 /// A classic CAN data or remote frame: an 11-bit or 29-bit identifier and 0…8 bytes.
 ///
 /// Engines hold frames in this form; at their boundary any [`embedded_can::Frame`] goes in
@@ -52,6 +54,12 @@ impl Frame {
         let (room, _) = data.split_at_mut(N);
         room.copy_from_slice(&bytes);
         Self { head: (id & 0x7FF) as u64 | (N as u64) << LEN, data }
+    }
+
+    /// A data frame with what a PDO carries.
+    #[inline]
+    pub(crate) fn of_payload(id: StandardId, payload: Payload) -> Self {
+        Self { head: u64::from(id.as_raw()) | u64::from(payload.len()) << LEN, data: payload.bytes() }
     }
 
     /// The same content as another crate's frame.

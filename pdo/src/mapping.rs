@@ -96,12 +96,25 @@ pub struct LengthError {
 }
 
 /// A mapping with room for `N` entries (at most 64 make sense).
-#[derive(Clone, Copy, PartialEq, Eq)]
+///
+/// It can be changed in the steps of 1600h and 1A00h: [`disable`](Self::disable), [`set`](Self::set) for
+/// each entry, [`enable`](Self::enable).
+#[derive(Clone, Copy)]
 pub struct Mapping<const N: usize = MAX_ENTRIES> {
+    /// Those behind `len` are set, but not in effect.
     entries: [Entry; N],
     len: u8,
     bits: u8,
 }
+
+/// The same objects in the same order.
+impl<const N: usize> PartialEq for Mapping<N> {
+    fn eq(&self, other: &Self) -> bool {
+        self.entries() == other.entries()
+    }
+}
+
+impl<const N: usize> Eq for Mapping<N> {}
 
 impl<const N: usize> Default for Mapping<N> {
     fn default() -> Self {
@@ -149,6 +162,42 @@ impl<const N: usize> Mapping<N> {
         self.len = number;
         self.bits = end as u8;
         Ok(())
+    }
+
+    /// Nothing is mapped any more; the entries can be [`set`](Self::set) anew.
+    pub const fn disable(&mut self) {
+        self.len = 0;
+        self.bits = 0;
+    }
+
+    /// Sets entry `number`, from 1, of a mapping that is disabled; `false` where it is not, or has no such
+    /// entry.
+    pub fn set(&mut self, number: u8, object: Entry) -> bool {
+        let slot = self.entries.get_mut(usize::from(number).wrapping_sub(1));
+        slot.filter(|_| self.len == 0).map(|slot| *slot = object).is_some()
+    }
+
+    /// Entry `number`, from 1, whether in effect or only set.
+    #[must_use]
+    pub fn entry(&self, number: u8) -> Option<Entry> {
+        self.entries.get(usize::from(number).wrapping_sub(1)).copied()
+    }
+
+    /// The first `count` entries that were set are mapped from now on.
+    ///
+    /// # Errors
+    /// [`MappingError`] where they do not fit; nothing is changed then.
+    pub fn enable(&mut self, count: u8) -> Result<(), MappingError> {
+        let before = (self.len, self.bits);
+        self.disable();
+        let enabled = (1..=count).try_for_each(|number| {
+            let object = self.entry(number).ok_or(MappingError::TooMany(N))?;
+            self.push(object)
+        });
+        if enabled.is_err() {
+            (self.len, self.bits) = before;
+        }
+        enabled
     }
 
     /// The entries.
@@ -199,7 +248,7 @@ impl<const N: usize> Mapping<N> {
             word |= bits.wrapping_shl(offset);
             offset += u32::from(entry.bits);
         }
-        Payload::new(word, self.bytes())
+        Payload::checked(word, self.bytes())
     }
 }
 
@@ -244,6 +293,23 @@ mod tests {
             _ => -2i64 as u64,
         });
         assert_eq!(packed.bytes(), bytes);
+    }
+
+    /// CiA 301, 7.5.2.36: count 0, entries, count.
+    #[test]
+    fn changed_step_by_step() {
+        let [one, two] = [Entry::new(0x6040, 0, 16), Entry::new(0x60FF, 0, 32)];
+        let mut mapping: Mapping<2> = Mapping::new(&[one, two]).unwrap();
+        assert!(!mapping.set(1, two), "still in effect");
+        mapping.disable();
+        assert_eq!((mapping, mapping.bits(), mapping.entry(2)), (Mapping::EMPTY, 0, Some(two)));
+        assert!(mapping.set(1, two) && !mapping.set(0, one) && !mapping.set(3, one));
+        mapping.enable(1).unwrap();
+        assert_eq!((mapping.entries(), mapping.bits()), (&[two][..], 32));
+        assert_eq!(mapping.enable(3), Err(MappingError::TooMany(2)));
+        assert_eq!(mapping.entries(), [two], "nothing is changed");
+        mapping.enable(2).unwrap();
+        assert_eq!(mapping.entries(), [two, two]);
     }
 
     /// 64 objects of one bit.

@@ -25,6 +25,12 @@ impl Payload {
         }
     }
 
+    /// As [`new`](Self::new) for up to 8 bytes with all bits above them clear.
+    #[inline]
+    pub(crate) const fn checked(word: u64, len: u8) -> Self {
+        Self { word, len }
+    }
+
     /// The data of a frame; bytes beyond the 8th are cut off.
     #[must_use]
     #[inline]
@@ -74,9 +80,7 @@ impl Payload {
     #[must_use]
     #[inline]
     pub fn frame(self, id: embedded_can::StandardId) -> crate::Frame {
-        let bytes = self.bytes();
-        crate::Frame::data_frame(id, bytes.get(..usize::from(self.len)).unwrap_or(&[]))
-            .unwrap_or_else(|| crate::Frame::standard(id.as_raw(), bytes))
+        crate::Frame::of_payload(id, self)
     }
 }
 

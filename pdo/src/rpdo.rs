@@ -18,6 +18,16 @@ pub struct RpdoConfig {
     pub bytes: u8,
 }
 
+impl RpdoConfig {
+    /// Receives nothing.
+    pub const OFF: Self = Self {
+        cob_id: CobId(CobId::INVALID),
+        transmission: Transmission::EventProfile,
+        timeout: Duration::ZERO,
+        bytes: 0,
+    };
+}
+
 /// What [`Rpdo::poll_event`] tells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
@@ -60,8 +70,11 @@ const NONE: u16 = 0xFFFF;
 impl Rpdo {
     /// Before the first PDO.
     #[must_use]
-    pub fn new(config: RpdoConfig) -> Self {
-        let id = config.cob_id.standard_id().filter(|_| config.cob_id.is_valid()).unwrap_or(NONE);
+    pub const fn new(config: RpdoConfig) -> Self {
+        let id = match config.cob_id.standard_id() {
+            Some(id) if config.cob_id.is_valid() => id,
+            _ => NONE,
+        };
         let synchronous = config.transmission.is_synchronous();
         Self {
             config,

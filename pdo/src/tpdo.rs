@@ -21,6 +21,17 @@ pub struct TpdoConfig {
     pub sync_start: u8,
 }
 
+impl TpdoConfig {
+    /// Sends nothing.
+    pub const OFF: Self = Self {
+        cob_id: CobId(CobId::INVALID),
+        transmission: Transmission::EventProfile,
+        inhibit: Duration::ZERO,
+        event_timer: Duration::ZERO,
+        sync_start: 0,
+    };
+}
+
 /// A sent PDO.
 ///
 /// - Commands: [`trigger`](Self::trigger), [`reset`](Self::reset).
@@ -50,8 +61,11 @@ pub struct Tpdo {
 impl Tpdo {
     /// Before the first PDO. An event-driven one is sent once at the beginning, so that all know.
     #[must_use]
-    pub fn new(config: TpdoConfig) -> Self {
-        let id = config.cob_id.standard_id().filter(|_| config.cob_id.is_valid()).and_then(StandardId::new);
+    pub const fn new(config: TpdoConfig) -> Self {
+        let id = match config.cob_id.standard_id() {
+            Some(id) if config.cob_id.is_valid() => StandardId::new(id),
+            _ => None,
+        };
         Self {
             config,
             id,

@@ -5,6 +5,7 @@ use core::time::Duration;
 use pdo::Address;
 
 use super::{Booted, Config, ErrorControl, Failure, Running, runs};
+use crate::clock::{after, after_ms, is_due};
 use crate::guarding;
 use crate::lss::Part;
 use crate::nmt::{Command, State};
@@ -80,7 +81,7 @@ impl<'d> Process<'d> {
             ErrorControl::Guarding(config) => (config.life_time(), true),
             ErrorControl::None => (self.config.answer, true),
         };
-        self.deadline = Some(now.saturating_add(wait));
+        self.deadline = Some(after(now, wait));
         if ask { Action::AskState } else { Action::Wait }
     }
 
@@ -112,7 +113,7 @@ impl<'d> Process<'d> {
     }
 
     pub(crate) fn on_timeout(&mut self, now: Duration) -> Action<'d> {
-        if self.deadline.is_none_or(|deadline| now < deadline) {
+        if !is_due(self.deadline, now) {
             return Action::Wait;
         }
         self.deadline = None;
@@ -190,7 +191,7 @@ impl<'d> Process<'d> {
 
     fn reset(&mut self, now: Duration) -> Action<'d> {
         self.step = Step::BootUp;
-        self.deadline = Some(now.saturating_add(self.config.boot_up));
+        self.deadline = Some(after(now, self.config.boot_up));
         Action::Nmt(Command::ResetCommunication)
     }
 
@@ -254,11 +255,11 @@ impl<'d> Process<'d> {
         match self.config.error_control {
             ErrorControl::None => self.start(),
             ErrorControl::Heartbeat { consumer_ms, .. } => {
-                self.deadline = Some(now.saturating_add(millis(consumer_ms)));
+                self.deadline = Some(after_ms(now, consumer_ms.into()));
                 Action::WatchHeartbeat(consumer_ms)
             }
             ErrorControl::Guarding(config) => {
-                self.deadline = Some(now.saturating_add(config.life_time()));
+                self.deadline = Some(after_ms(now, config.life_time_ms()));
                 Action::Guard(config)
             }
         }

@@ -109,7 +109,8 @@ types! {
 impl DataType {
     /// Bytes of a value over SDO; `None` where it depends on the value.
     #[must_use]
-    #[inline]
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    #[cfg_attr(not(target_pointer_width = "32"), inline)]
     pub const fn size(self) -> Option<u8> {
         match self.kind() {
             Kind::Boolean => Some(1),

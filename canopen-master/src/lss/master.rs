@@ -4,6 +4,8 @@ use core::time::Duration;
 
 use pdo::{Frame, Handled, NodeId, cob};
 
+use crate::clock::{after, is_due};
+
 use super::{
     BitTiming, FASTSCAN_CONFIRM, Identity, Mode, Part, Refusal, Request, Response, UNCONFIGURED, node_of,
 };
@@ -192,7 +194,7 @@ impl Master {
             (Operation::Select(_), Step::Part(part)) if part != Part::Serial => {
                 State::Send(Step::Part(part.next()))
             }
-            _ => State::Wait(step, now.saturating_add(wait)),
+            _ => State::Wait(step, after(now, wait)),
         };
         Some(frame)
     }
@@ -235,7 +237,7 @@ impl Master {
     /// Ends waiting when its time is over; early calls do nothing.
     pub fn handle_timeout(&mut self, now: Duration) {
         let State::Wait(step, deadline) = self.state else { return };
-        if now < deadline {
+        if !is_due(Some(deadline), now) {
             return;
         }
         let next = match step {

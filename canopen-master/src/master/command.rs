@@ -8,6 +8,7 @@ use pdo::{Address, Frame, NodeId};
 use super::node::{Data, Job};
 use super::{Master, NMT_COMMANDS, NmtJob, NmtTicket, QUEUE, Refused, ScanJob, SubmitError};
 use crate::boot::{self, Action, Process};
+use crate::clock::after;
 use crate::guarding::{self, Guard};
 use crate::heartbeat::Consumer;
 use crate::nmt::{Command, Target};
@@ -45,8 +46,8 @@ impl<'d, B: Buffer, const N: usize> Master<'d, B, N> {
             longest = longest.max(heartbeat).max(node.guard.map_or(0, |guard| guard.config().life_time_ms()));
         }
         let longest = Duration::from_millis(longest.into());
-        let deadline = now.saturating_add(self.config.confirm.max(longest));
-        let ask = (!command.is_reset()).then(|| now.saturating_add(self.config.confirm / 2));
+        let deadline = after(now, self.config.confirm.max(longest));
+        let ask = (!command.is_reset()).then(|| after(now, self.config.confirm / 2));
         if let Some(slot) = self.nmt.get_mut(slot) {
             let (confirmed, missing) = (NodeSet::EMPTY, NodeSet::EMPTY);
             *slot = Some(NmtJob { ticket, command, waiting, confirmed, missing, ask, deadline });

@@ -7,6 +7,7 @@ use pdo::{Address, NodeId};
 use super::Master;
 use super::node::{Data, Job, ScanStep};
 use crate::boot::Action;
+use crate::clock::{after, is_due};
 use crate::guarding::Guard;
 use crate::heartbeat::Consumer;
 use crate::lss::{Identity, Part};
@@ -114,11 +115,11 @@ impl<'d, B: Buffer, const N: usize> Master<'d, B, N> {
     pub(super) fn start_scan(&mut self, now: Duration) {
         let Some(id) = self.scan_candidate() else { return };
         let gap = self.config.frame_time();
-        let Some(scan) = self.scan.as_mut().filter(|scan| now >= scan.next) else { return };
+        let Some(scan) = self.scan.as_mut().filter(|scan| is_due(Some(scan.next), now)) else { return };
         if self.sdo_ready.len() + self.queue.len() >= WAITING {
             return;
         }
-        scan.next = now.saturating_add(gap);
+        scan.next = after(now, gap);
         scan.todo.remove(id);
         scan.active.insert(id);
         let timeout = scan.options.answer;

@@ -136,7 +136,7 @@ impl<B: Buffer> Node<'_, B> {
 
     /// The earliest of its deadlines, those of error control only while the bus is there.
     pub(super) fn poll_timeout(&self, bus: bool) -> Option<Duration> {
-        let guard = self.guard.as_ref().filter(|_| bus).map(Guard::poll_timeout);
+        let guard = self.guard.as_ref().filter(|_| bus).and_then(Guard::poll_timeout);
         let heartbeat = self.heartbeat.as_ref().filter(|_| bus).and_then(Consumer::poll_timeout);
         let boot = match &self.job {
             Job::Boot(process) => process.deadline(),

@@ -8,7 +8,7 @@ use super::event::Notice;
 use super::node::Job;
 use super::{BusStatus, Master};
 use crate::boot::Action;
-use crate::clock::{earlier, earliest};
+use crate::clock::{after, earlier, earliest, is_due};
 use crate::node_set::NodeSet;
 use crate::sdo::Buffer;
 
@@ -22,7 +22,7 @@ impl<B: Buffer, const N: usize> Master<'_, B, N> {
     /// Lets everything happen whose time has come; early calls do nothing.
     pub fn handle_timeout(&mut self, now: Duration) {
         self.lss.handle_timeout(now);
-        if self.bound.is_none_or(|bound| now < bound) {
+        if !is_due(self.bound, now) {
             return;
         }
         self.bound = None;
@@ -30,7 +30,7 @@ impl<B: Buffer, const N: usize> Master<'_, B, N> {
         for id in NodeId::all().take(N) {
             // A loss that finds no place is told later, not never.
             if self.event_room() < PER_NODE {
-                self.due(Some(now.saturating_add(LATER)));
+                self.due(Some(after(now, LATER)));
                 break;
             }
             self.node_timeout(now, id);
@@ -50,7 +50,7 @@ impl<B: Buffer, const N: usize> Master<'_, B, N> {
         let on = self.bus.is_on();
         let Some(node) = self.node_mut(id) else { return };
         let next = node.poll_timeout(on);
-        if next.is_none_or(|next| now < next) {
+        if !is_due(next, now) {
             return self.due(next);
         }
         if let Job::Boot(process) = &mut node.job {
@@ -90,11 +90,12 @@ impl<B: Buffer, const N: usize> Master<'_, B, N> {
         let mut ask = NodeSet::EMPTY;
         let mut bound = None;
         for job in self.nmt.iter_mut().flatten().filter(|job| !job.is_over()) {
-            if now >= job.deadline {
+            if is_due(Some(job.deadline), now) {
                 job.missing = job.missing.or(core::mem::take(&mut job.waiting));
                 continue;
             }
-            if job.ask.take_if(|ask| now >= *ask).is_some() {
+            if is_due(job.ask, now) {
+                job.ask = None;
                 ask = ask.or(job.waiting);
             }
             waiting = waiting.or(job.waiting);

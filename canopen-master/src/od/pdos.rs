@@ -3,15 +3,15 @@
 
 use core::time::Duration;
 
-use pdo::mapping::Entry as Mapped;
+use pdo::mapping::{Entry as Mapped, MappingError};
 use pdo::{
     Address, CobId, Frame, Handled, Mapping, Payload, Rpdo, RpdoConfig, RpdoEvent, Tpdo, TpdoConfig,
     Transmission, cob,
 };
 
 use super::{Dictionary, Hooks};
-use crate::data_type::Scalar;
-use crate::sdo::{AbortCode, Access, Piece, Small, Total, read_slice};
+use crate::clock::earlier;
+use crate::sdo::{AbortCode, Access, Piece, Total, read_slice};
 
 /// Communication parameters in the units of the objects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -41,93 +41,83 @@ impl Communication {
 pub struct PdoSlot<const M: usize> {
     /// 1400h or 1800h.
     pub communication: Communication,
-    /// What is mapped; in effect while sub-index 00h is not 0.
+    /// 1600h or 1A00h.
     pub mapping: Mapping<M>,
-    /// What was written to the mapping parameters since sub-index 00h was set to 0.
-    entries: [Mapped; M],
 }
 
 impl<const M: usize> PdoSlot<M> {
     /// With these parameters.
     #[must_use]
-    pub fn new(communication: Communication, mapping: Mapping<M>) -> Self {
-        let mut slot = Self { communication, mapping, entries: [Mapped::new(0, 0, 0); M] };
-        slot.entries.iter_mut().zip(mapping.entries()).for_each(|(to, &from)| *to = from);
-        slot
+    pub const fn new(communication: Communication, mapping: Mapping<M>) -> Self {
+        Self { communication, mapping }
+    }
+
+    /// A PDO that maps nothing is not valid.
+    const fn cob_id(&self) -> CobId {
+        let cob_id = self.communication.cob_id;
+        cob_id.with_valid(cob_id.is_valid() && self.mapping.bits() > 0)
     }
 
     fn rpdo(&self) -> RpdoConfig {
-        let Communication { cob_id, transmission, event_timer, .. } = self.communication;
+        let Communication { transmission, event_timer, .. } = self.communication;
         let timeout = Duration::from_millis(event_timer.into());
-        // A PDO that maps nothing is not valid.
-        let cob_id = cob_id.with_valid(cob_id.is_valid() && self.mapping.bits() > 0);
-        RpdoConfig { cob_id, transmission, timeout, bytes: self.mapping.bytes() }
+        RpdoConfig { cob_id: self.cob_id(), transmission, timeout, bytes: self.mapping.bytes() }
     }
 
     fn tpdo(&self) -> TpdoConfig {
-        let Communication { cob_id, transmission, inhibit, event_timer, sync_start } = self.communication;
-        TpdoConfig {
-            cob_id: cob_id.with_valid(cob_id.is_valid() && self.mapping.bits() > 0),
-            transmission,
-            inhibit: Duration::from_micros(u64::from(inhibit) * 100),
-            event_timer: Duration::from_millis(event_timer.into()),
-            sync_start,
-        }
+        let Communication { transmission, inhibit, event_timer, sync_start, .. } = self.communication;
+        let inhibit = Duration::from_micros(u64::from(inhibit) * 100);
+        let event_timer = Duration::from_millis(event_timer.into());
+        TpdoConfig { cob_id: self.cob_id(), transmission, inhibit, event_timer, sync_start }
     }
 
-    fn read(&self, at: Parameter) -> Result<Small, AbortCode> {
+    /// The value of a parameter and its bytes.
+    fn read(&self, at: Parameter) -> Result<(u32, usize), AbortCode> {
         let com = &self.communication;
         Ok(match (at.mapping, at.sub) {
-            (false, 0) => Small::from(if at.rpdo { 5u8 } else { 6 }),
-            (false, 1) => Small::from(com.cob_id.0),
-            (false, 2) => Small::from(com.transmission.raw()),
-            (false, 3) => Small::from(com.inhibit),
-            (false, 5) => Small::from(com.event_timer),
-            (false, 6) if !at.rpdo => Small::from(com.sync_start),
-            (true, 0) => Small::from(self.mapping.entries().len() as u8),
-            (true, sub) => {
-                let entry = self.entries.get(usize::from(sub) - 1).ok_or(AbortCode::NO_SUB_INDEX)?;
-                Small::from(entry.raw())
-            }
-            _ => return Err(AbortCode::NO_SUB_INDEX),
+            (false, 0) => (if at.rpdo { 5 } else { 6 }, 1),
+            (false, 1) => (com.cob_id.0, 4),
+            (false, 2) => (com.transmission.raw().into(), 1),
+            (false, 3) => (com.inhibit.into(), 2),
+            (false, 5) => (com.event_timer.into(), 2),
+            (false, 6) if !at.rpdo => (com.sync_start.into(), 1),
+            (false, _) => return Err(AbortCode::NO_SUB_INDEX),
+            (true, 0) => (self.mapping.entries().len() as u32, 1),
+            (true, sub) => (self.mapping.entry(sub).ok_or(AbortCode::NO_SUB_INDEX)?.raw(), 4),
         })
     }
 
-    fn write(&mut self, at: Parameter, value: &[u8], objects: &impl Mappable) -> Result<(), AbortCode> {
+    /// Changes a parameter that can be read; `value` has as many bytes.
+    fn write(&mut self, at: Parameter, value: u32, objects: &impl Mappable) -> Result<(), AbortCode> {
         let valid = self.communication.cob_id.is_valid();
         let com = &mut self.communication;
         match (at.mapping, at.sub) {
-            (false, 1) => com.cob_id = checked_cob_id(com.cob_id, CobId(scalar(value)?))?,
+            (false, 0) => return Err(AbortCode::READ_ONLY),
+            (false, 1) => com.cob_id = checked_cob_id(com.cob_id, CobId(value))?,
             (false, 2) => {
-                let new = Transmission::new(scalar(value)?).map_err(|_| AbortCode::INVALID_VALUE)?;
+                let new = Transmission::new(value as u8).map_err(|_| AbortCode::INVALID_VALUE)?;
                 if at.rpdo && matches!(new, Transmission::RtrSync | Transmission::RtrEvent) {
                     return Err(AbortCode::INVALID_VALUE);
                 }
                 com.transmission = new;
             }
+            (false, 5) => com.event_timer = value as u16,
             // The inhibit time and the start value must not change while the PDO is valid.
-            (false, 3) => com.inhibit = unless(valid, scalar(value)?)?,
-            (false, 5) => com.event_timer = scalar(value)?,
-            (false, 6) if !at.rpdo => com.sync_start = unless(valid, scalar(value)?)?,
-            (false, 0) => return Err(AbortCode::READ_ONLY),
-            (false, _) => return Err(AbortCode::NO_SUB_INDEX),
+            (false, _) if valid => return Err(AbortCode::INVALID_VALUE),
+            (false, 3) => com.inhibit = value as u16,
+            (false, _) => com.sync_start = value as u8,
             (true, _) if valid => return Err(AbortCode::UNSUPPORTED_ACCESS),
-            (true, 0) => {
-                let count = usize::from(scalar::<u8>(value)?);
-                let entries = self.entries.get(..count).ok_or(AbortCode::PDO_LENGTH)?;
-                self.mapping = Mapping::new(entries).map_err(|error| match error {
-                    pdo::mapping::MappingError::NoBits { .. } => AbortCode::NOT_MAPPABLE,
-                    _ => AbortCode::PDO_LENGTH,
-                })?;
-            }
+            (true, 0) => self.mapping.enable(value as u8).map_err(|error| match error {
+                MappingError::NoBits { .. } => AbortCode::NOT_MAPPABLE,
+                _ => AbortCode::PDO_LENGTH,
+            })?,
             (true, sub) => {
+                let entry = Mapped::from_raw(value);
                 if !self.mapping.entries().is_empty() {
                     return Err(AbortCode::UNSUPPORTED_ACCESS);
                 }
-                let slot = self.entries.get_mut(usize::from(sub) - 1).ok_or(AbortCode::NO_SUB_INDEX)?;
-                let entry = Mapped::from_raw(scalar(value)?);
                 objects.check(entry, at.rpdo)?;
-                *slot = entry;
+                self.mapping.set(sub, entry);
             }
         }
         Ok(())
@@ -156,22 +146,12 @@ impl Parameter {
     }
 }
 
-fn scalar<T: Scalar>(value: &[u8]) -> Result<T, AbortCode> {
-    T::from_bytes(value).map_err(|error| {
-        if error.found > usize::from(error.expected) { AbortCode::TOO_LONG } else { AbortCode::TOO_SHORT }
-    })
-}
-
-fn unless<T>(forbidden: bool, value: T) -> Result<T, AbortCode> {
-    if forbidden { Err(AbortCode::INVALID_VALUE) } else { Ok(value) }
-}
-
 /// An identifier must not change while the PDO is valid, must have 11 bits and not be restricted.
 fn checked_cob_id(old: CobId, new: CobId) -> Result<CobId, AbortCode> {
     let id = new.standard_id().ok_or(AbortCode::INVALID_VALUE)?;
     let changed = old.id() != new.id();
     let refused = new.is_valid() && (cob::is_restricted(id) || (changed && old.is_valid()));
-    unless(refused, new)
+    if refused { Err(AbortCode::INVALID_VALUE) } else { Ok(new) }
 }
 
 /// Which objects may be mapped.
@@ -216,9 +196,9 @@ pub struct Pdos<const R: usize, const T: usize, const M: usize> {
 impl<const R: usize, const T: usize, const M: usize> Pdos<R, T, M> {
     /// With these parameters, not running.
     #[must_use]
-    pub fn new(rpdo_slots: [PdoSlot<M>; R], tpdo_slots: [PdoSlot<M>; T]) -> Self {
-        let rpdos = rpdo_slots.each_ref().map(|slot| Rpdo::new(slot.rpdo()));
-        let tpdos = tpdo_slots.each_ref().map(|slot| Tpdo::new(slot.tpdo()));
+    pub const fn new(rpdo_slots: [PdoSlot<M>; R], tpdo_slots: [PdoSlot<M>; T]) -> Self {
+        let rpdos = [const { Rpdo::new(RpdoConfig::OFF) }; R];
+        let tpdos = [const { Tpdo::new(TpdoConfig::OFF) }; T];
         Self { rpdo_slots, tpdo_slots, rpdos, tpdos, running: false }
     }
 
@@ -237,8 +217,8 @@ impl<const R: usize, const T: usize, const M: usize> Pdos<R, T, M> {
     /// The node enters the NMT state operational.
     pub fn start(&mut self) {
         self.running = true;
-        self.rpdos.iter_mut().zip(&self.rpdo_slots).for_each(|(rpdo, slot)| rpdo.reset(slot.rpdo()));
-        self.tpdos.iter_mut().zip(&self.tpdo_slots).for_each(|(tpdo, slot)| tpdo.reset(slot.tpdo()));
+        (0..R).for_each(|number| self.restart(true, number));
+        (0..T).for_each(|number| self.restart(false, number));
     }
 
     /// The node leaves the NMT state operational.
@@ -287,8 +267,8 @@ impl<const R: usize, const T: usize, const M: usize> Pdos<R, T, M> {
         if !self.running {
             return None;
         }
-        let rpdos = self.rpdos.iter().filter_map(Rpdo::poll_timeout);
-        rpdos.chain(self.tpdos.iter().filter_map(Tpdo::poll_timeout)).min()
+        let rpdos = self.rpdos.iter().map(Rpdo::poll_timeout).fold(None, earlier);
+        self.tpdos.iter().map(Tpdo::poll_timeout).fold(rpdos, earlier)
     }
 
     /// The frame to send now, once.
@@ -321,20 +301,26 @@ impl<const R: usize, const T: usize, const M: usize> Pdos<R, T, M> {
         None
     }
 
-    fn read(&self, at: Parameter) -> Result<Small, AbortCode> {
+    /// A PDO begins anew, with its parameters as they are now.
+    fn restart(&mut self, rpdo: bool, number: usize) {
+        if rpdo {
+            let Some(slot) = self.rpdo_slots.get(number) else { return };
+            self.rpdos.get_mut(number).into_iter().for_each(|rpdo| rpdo.reset(slot.rpdo()));
+        } else {
+            let Some(slot) = self.tpdo_slots.get(number) else { return };
+            self.tpdos.get_mut(number).into_iter().for_each(|tpdo| tpdo.reset(slot.tpdo()));
+        }
+    }
+
+    fn read(&self, at: Parameter) -> Result<(u32, usize), AbortCode> {
         let slots: &[PdoSlot<M>] = if at.rpdo { &self.rpdo_slots } else { &self.tpdo_slots };
         slots.get(at.pdo).ok_or(AbortCode::NO_OBJECT)?.read(at)
     }
 
-    fn write(&mut self, at: Parameter, value: &[u8], objects: &impl Mappable) -> Result<(), AbortCode> {
+    fn write(&mut self, at: Parameter, value: u32, objects: &impl Mappable) -> Result<(), AbortCode> {
         let slots: &mut [PdoSlot<M>] = if at.rpdo { &mut self.rpdo_slots } else { &mut self.tpdo_slots };
-        let slot = slots.get_mut(at.pdo).ok_or(AbortCode::NO_OBJECT)?;
-        slot.write(at, value, objects)?;
-        if at.rpdo {
-            self.rpdos.get_mut(at.pdo).into_iter().for_each(|rpdo| rpdo.reset(slot.rpdo()));
-        } else {
-            self.tpdos.get_mut(at.pdo).into_iter().for_each(|tpdo| tpdo.reset(slot.tpdo()));
-        }
+        slots.get_mut(at.pdo).ok_or(AbortCode::NO_OBJECT)?.write(at, value, objects)?;
+        self.restart(at.rpdo, at.pdo);
         Ok(())
     }
 }
@@ -358,7 +344,10 @@ impl<H: Hooks, const R: usize, const T: usize, const M: usize> Access for Object
     fn read(&mut self, at: Address, offset: u32, out: &mut [u8]) -> Result<(usize, Total), AbortCode> {
         match Parameter::of(at) {
             None => self.dictionary.read(at, offset, out),
-            Some(parameter) => Ok(read_slice(self.pdos.read(parameter)?.as_slice(), offset, out)),
+            Some(parameter) => {
+                let (value, size) = self.pdos.read(parameter)?;
+                Ok(read_slice(value.to_le_bytes().get(..size).unwrap_or(&[]), offset, out))
+            }
         }
     }
 
@@ -371,13 +360,17 @@ impl<H: Hooks, const R: usize, const T: usize, const M: usize> Access for Object
 
     fn write(&mut self, at: Address, piece: &Piece<'_>) -> Result<(), AbortCode> {
         let Some(parameter) = Parameter::of(at) else { return self.dictionary.write(at, piece) };
-        let old = self.pdos.read(parameter)?;
-        if !piece.is_whole() {
+        let (_, size) = self.pdos.read(parameter)?;
+        // Without indicated size an expedited download brings 4 bytes.
+        let found = if piece.size.is_none() { piece.data.len().min(size) } else { piece.data.len() };
+        if !piece.is_whole() || found > size {
             return Err(AbortCode::TOO_LONG);
         }
-        // Without indicated size an expedited download brings 4 bytes.
-        let cut = if piece.size.is_none() { piece.data.get(..old.as_slice().len()) } else { None };
-        self.pdos.write(parameter, cut.unwrap_or(piece.data), &self.dictionary)
+        if found < size {
+            return Err(AbortCode::TOO_SHORT);
+        }
+        let value = piece.data.iter().take(size).rev().fold(0, |value, &byte| value << 8 | u32::from(byte));
+        self.pdos.write(parameter, value, &self.dictionary)
     }
 
     fn abandon(&mut self, at: Address) {

@@ -34,7 +34,8 @@ static BOOT: boot::Config<'static> = boot::Config {
 
 #[unsafe(no_mangle)]
 extern "C" fn _start() {
-    let mut master = Engine::new(black_box(Config::default()));
+    let mut engine = Engine::new(black_box(Config::default()));
+    let master = black_box(&mut engine);
     let node = black_box(NodeId::MIN);
     let at = black_box(Address::new(0x1000, 0));
     let options = black_box(Options::block(now()));
@@ -58,10 +59,10 @@ extern "C" fn _start() {
             if black_box(false) {
                 master.handle_refused(frame);
             }
-            black_box(frame);
+            black_box(&frame);
         }
         while let Some(event) = master.poll_event() {
-            black_box(event);
+            black_box(&event);
         }
         while let Some((node, number)) = master.poll_pdo() {
             black_box(master.pdo(node, number));

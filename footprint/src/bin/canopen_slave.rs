@@ -10,8 +10,8 @@ use canopen_master::emcy::ErrorCode;
 use canopen_master::lss::Identity;
 use canopen_master::od::{Communication, Dictionary, Entry, PdoSlot, Pdos, Rights, Table};
 use canopen_master::slave::{Config, Device, Event, Slave};
-use canopen_master::{BusStatus, Frame, NodeId};
-use footprint::{now, wire};
+use canopen_master::{BusStatus, NodeId};
+use footprint::{now, received};
 use pdo::{CobId, Mapping};
 
 type Engine<'a> = Slave<Device<'a, (), 4, 4, 8>>;
@@ -51,27 +51,25 @@ extern "C" fn _start() {
     let config = black_box(Config::new(Identity::default(), Some(NodeId::MIN)));
     let mut slave = Engine::new(&config, Device { dictionary, pdos });
     slave.boot(now());
-    loop {
-        if let Some(frame) =
-            Frame::data_frame(black_box(embedded_can::StandardId::ZERO), wire().get(..8).unwrap_or(&[]))
-        {
-            black_box(slave.handle_frame(now(), &frame));
-        }
-        slave.handle_timeout(now());
-        slave.handle_bus(now(), black_box(BusStatus::Active));
-        black_box(slave.raise(black_box(ErrorCode::TEMPERATURE), [0; 5]).is_ok());
-        black_box(slave.clear(black_box(ErrorCode::TEMPERATURE)).is_ok());
-        while let Some(frame) = slave.poll_transmit(now()) {
-            black_box(frame);
-        }
-        while let Some(event) = slave.poll_event() {
-            match event {
-                Event::ResetNode | Event::ResetCommunication => black_box(slave.boot(now())),
-                event => black_box(event) == event,
-            };
-        }
-        if black_box(slave.poll_timeout()).is_none() {
-            return;
+    // As a firmware does from its interrupts and its main loop.
+    while step(black_box(&mut slave)) {}
+}
+
+#[inline(never)]
+fn step(slave: &mut Engine<'_>) -> bool {
+    black_box(slave.handle_frame(now(), &received()));
+    slave.handle_timeout(now());
+    slave.handle_bus(now(), black_box(BusStatus::Active));
+    black_box(slave.raise(black_box(ErrorCode::TEMPERATURE), [0; 5]).is_ok());
+    black_box(slave.clear(black_box(ErrorCode::TEMPERATURE)).is_ok());
+    while let Some(frame) = slave.poll_transmit(now()) {
+        black_box(&frame);
+    }
+    while let Some(event) = slave.poll_event() {
+        black_box(&event);
+        if matches!(event, Event::ResetNode | Event::ResetCommunication) {
+            black_box(slave.boot(now()));
         }
     }
+    black_box(slave.poll_timeout()).is_some()
 }

@@ -11,7 +11,7 @@ use pdo::{Frame, Handled};
 use super::block::{Receiver, Sender};
 use super::message::{ABORT, Request, Response, SEGMENT};
 use super::{AbortCode, Address, Buffer, Channel, data_on};
-use crate::clock::after;
+use crate::clock::{after, is_due};
 pub use block::Block;
 pub use outcome::{Fault, Finished, Outcome, Refused, SubmitError, Ticket};
 
@@ -268,10 +268,10 @@ impl<B: Buffer> Client<B> {
 
     /// Gives up what has waited too long; early calls do nothing.
     pub fn handle_timeout(&mut self, now: Duration) {
-        if self.outstanding.is_some_and(|outstanding| now >= outstanding.until) {
+        if is_due(self.outstanding.map(|outstanding| outstanding.until), now) {
             self.outstanding = None;
         }
-        let Some(deadline) = self.deadline.filter(|&deadline| now >= deadline) else { return };
+        let Some(deadline) = self.deadline.filter(|_| is_due(self.deadline, now)) else { return };
         if self.ask_again() {
             return;
         }

@@ -11,7 +11,7 @@ use pdo::{Frame, Handled};
 use super::block::{MAX_BLOCK_SIZE, Receiver, Sender, is_block_size};
 use super::message::{Request, Response, first};
 use super::{AbortCode, Address, Channel, data_on};
-use crate::clock::after;
+use crate::clock::{after, is_due};
 pub use access::{Access, Piece, Total, read_slice};
 
 /// Time that a client has for each next request, unless set (CiA 301 names none).
@@ -144,7 +144,7 @@ impl Server {
 
     /// Gives up a transfer whose client is silent; early calls do nothing.
     pub fn handle_timeout(&mut self, now: Duration, objects: &mut impl Access) {
-        if self.deadline.is_some_and(|deadline| now >= deadline) && !self.ask_again(now, objects) {
+        if is_due(self.deadline, now) && !self.ask_again(now, objects) {
             self.abort(AbortCode::TIMED_OUT, objects);
         }
     }
