@@ -210,6 +210,32 @@ fn upload_aborted_in_a_sub_block() {
     assert_eq!(script.ends(), Outcome::Aborted(canopen_master::sdo::AbortCode::NO_DATA));
 }
 
+/// 7.2.4.2.12: a server may change to the plain upload. One that has no blocks does so above the
+/// threshold, too, as python-canopen's; with threshold 0 that is a fault.
+#[test]
+fn upload_switched_above_the_threshold() {
+    for threshold in [1, 21] {
+        let mut client = Client::new(CHANNEL);
+        let block = Block { threshold, ..Block::default() };
+        client.upload(AT, Vec::new(), &Options { block: Some(block), ..options() }).unwrap();
+        let mut script = ClientScript(client);
+        script.sends(0, [0xA4, 0x00, 0x20, 1, 127, threshold, 0, 0]);
+        script.gets(0, [0x41, 0x00, 0x20, 1, 25, 0, 0, 0]);
+        for (toggle, last) in [(0, 0), (0x10, 0), (0, 0), (0x10, 7)] {
+            script.sends(0, [0x60 | toggle, 0, 0, 0, 0, 0, 0, 0]);
+            script.gets(0, [toggle | last, 9, 9, 9, 9, 9, 9, 9]);
+        }
+        let finished = script.0.poll_event().expect("an outcome");
+        assert_eq!((finished.outcome, finished.buffer), (Outcome::Done(25), vec![9; 25]));
+        script.sends_nothing(0);
+    }
+    let mut script = ClientScript::upload();
+    script.sends(0, BEGIN_UP);
+    script.gets(0, [0x41, 0x00, 0x20, 1, 25, 0, 0, 0]);
+    assert_eq!(script.ends(), Outcome::GaveUp(Fault::Unexpected { command: 0x41 }));
+    script.sends(0, [0x80, 0x00, 0x20, 1, 1, 0, 4, 5]);
+}
+
 struct ServerScript {
     server: Server,
     objects: Objects,

@@ -19,7 +19,7 @@ pub struct Block {
     /// Offer a CRC. Without one, only the numbers of the segments are checked.
     pub crc: bool,
     /// Protocol switch threshold: up to so many bytes go expedited or in segments. In an upload the
-    /// server decides; 0 forbids it.
+    /// server decides, and one without blocks that answers so above it is understood; 0 forbids it.
     pub threshold: u8,
 }
 
@@ -45,14 +45,10 @@ impl<B: Buffer> Client<B> {
         self.state = State::BlockDownloadBegun { crc: block.crc };
     }
 
-    /// The server answers without blocks, which the threshold must have allowed.
+    /// The server answers without blocks. One that has none does so above the threshold, too; the data
+    /// are as good, so only a caller who wants blocks and nothing else refuses them.
     pub(super) fn on_protocol_switch(&mut self, content: Content, threshold: u8, data: &[u8]) {
-        let size = match content {
-            Content::Expedited(bytes) => bytes.len() as u32,
-            Content::ExpeditedUnsized(_) => 1,
-            Content::Segmented(size) => size.unwrap_or(1),
-        };
-        if size > u32::from(threshold) {
+        if threshold == 0 {
             return self.give_up(Fault::Unexpected { command: data.first().copied().unwrap_or(0) });
         }
         self.on_upload_begun(content);

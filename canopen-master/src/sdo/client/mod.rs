@@ -66,7 +66,7 @@ enum State {
         sent: u8,
         last: bool,
     },
-    /// As `UploadBegun`, in blocks, or plain up to a threshold as the server likes.
+    /// As `UploadBegun`, in blocks, or plain as the server likes, unless the threshold is 0.
     BlockUploadBegun {
         threshold: u8,
     },

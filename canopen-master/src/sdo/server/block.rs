@@ -116,7 +116,8 @@ impl Server {
         self.sender = Sender::new(block_size);
         self.check = crc;
         self.state = State::BlockUploadBegun;
-        Ok(Response::InitiateBlockUpload { at: self.at, crc: true, size: self.size }.encode())
+        // Without the client's CRC there is none; some clients check one all the same if we claim ours.
+        Ok(Response::InitiateBlockUpload { at: self.at, crc, size: self.size }.encode())
     }
 
     /// The next segment of the sub-block.
