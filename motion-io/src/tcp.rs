@@ -54,6 +54,15 @@ fn readable(stream: &TcpStream, timeout: Duration) -> io::Result<bool> {
     Ok(true)
 }
 
+/// Reads, and has what came acknowledged at once: a peer that gathers small messages until its last one is
+/// acknowledged would else wait for the kernel's 40 ms. The kernel forgets the wish, so each read renews it.
+pub(crate) fn read_at_once(mut stream: &TcpStream, buffer: &mut [u8]) -> io::Result<usize> {
+    let len = stream.read(buffer)?;
+    #[cfg(target_os = "linux")]
+    let _ = std::os::linux::net::TcpStreamExt::set_quickack(stream, true);
+    Ok(len)
+}
+
 struct Stream(TcpStream);
 
 impl Port for Stream {
@@ -61,7 +70,7 @@ impl Port for Stream {
         if !readable(&self.0, timeout)? {
             return Ok(0);
         }
-        match self.0.read(buffer) {
+        match read_at_once(&self.0, buffer) {
             Ok(0) => Err(io::Error::new(io::ErrorKind::BrokenPipe, "the peer closed the connection")),
             Ok(len) => Ok(len),
             Err(error) if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut) => {

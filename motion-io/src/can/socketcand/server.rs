@@ -3,13 +3,14 @@
 use core::net::SocketAddr;
 use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
-use std::io::{self, Read, Write};
+use std::io::{self, Write};
 use std::net::{TcpListener, TcpStream};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::SystemTime;
 
 use super::super::{BusError, BusEvent, BusState, CanPort, Event, VirtualBus, VirtualPort};
 use super::{Messages, frame_message, parse_send};
+use crate::tcp::read_at_once;
 
 /// How often a waiting thread looks whether it is to end.
 const POLL: Duration = Duration::from_millis(100);
@@ -121,7 +122,7 @@ impl Session {
         let mut port: Option<VirtualPort> = None;
         let mut buffer = [0; 2048];
         while !stop.load(Ordering::Relaxed) && !self.ended.load(Ordering::Relaxed) {
-            let len = match (&self.stream).read(&mut buffer) {
+            let len = match read_at_once(&self.stream, &mut buffer) {
                 Ok(0) => return Ok(()),
                 Ok(len) => len,
                 Err(error)
