@@ -130,6 +130,15 @@ pub(crate) enum Can {
         #[command(flatten)]
         stream: Stream,
     },
+    /// All frames into a capture file, until stopped
+    Record {
+        /// Ends with .log (candump), .asc, .trc or .pcapng
+        file: PathBuf,
+        #[command(flatten)]
+        line: CanLine,
+        #[command(flatten)]
+        stream: Stream,
+    },
 }
 
 #[derive(Debug, Clone, Args)]

@@ -6,6 +6,7 @@ mod link;
 mod lss;
 mod network;
 mod pdo;
+mod record;
 mod sdo;
 pub(crate) mod session;
 pub(crate) mod sim;
@@ -33,6 +34,7 @@ pub(crate) fn run(out: &Output, global: &Global, command: &Can) -> Result<(), Ex
         Can::Link { command } => link::run(out, global, command),
         Can::Emcy { line, stream } => network::emcy(out, global, line, stream),
         Can::Monitor { line, stream } => network::monitor(out, global, line, stream),
+        Can::Record { file, line, stream } => record::run(out, global, line, file, stream),
     }
 }
 

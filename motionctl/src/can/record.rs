@@ -1,0 +1,93 @@
+//! `motionctl can record`: a bus into a capture file.
+
+use core::sync::atomic::Ordering;
+use core::time::Duration;
+use std::fs::File;
+use std::io::{self, BufWriter};
+use std::path::Path;
+use std::time::{Instant, SystemTime};
+
+use embedded_can::Frame as _;
+use motion_io::can::{Event, open};
+use motion_io::capture::{Frame, FrameKind, Record, Time, WriteFormat, Writer};
+use serde_json::json;
+
+use super::cli::{CanLine, Stream};
+use super::network::STEP;
+use super::session::{duration, endpoint, gone};
+use super::stop_flag;
+use crate::cli::Global;
+use crate::exit::Exit;
+use crate::output::Output;
+
+/// The format that a file's name asks for.
+fn format_of(path: &Path) -> Result<WriteFormat, Exit> {
+    let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or("");
+    match extension.to_ascii_lowercase().as_str() {
+        "log" => Ok(WriteFormat::Candump),
+        "asc" => Ok(WriteFormat::Asc),
+        "trc" => Ok(WriteFormat::Trc),
+        "pcapng" => Ok(WriteFormat::PcapNg),
+        _ => Err(Exit::usage(format!(
+            "{}: a file that ends with .log (candump), .asc, .trc or .pcapng expected",
+            path.display()
+        ))),
+    }
+}
+
+/// A frame of the bus, now.
+fn record(frame: &pdo::Frame) -> Option<Record> {
+    let (id, extended) = match frame.id() {
+        embedded_can::Id::Standard(id) => (u32::from(id.as_raw()), false),
+        embedded_can::Id::Extended(id) => (id.as_raw(), true),
+    };
+    let frame = if frame.is_remote() {
+        Frame::new(id, extended, FrameKind::Remote, [0; 8].get(..frame.dlc())?)
+    } else {
+        Frame::new(id, extended, FrameKind::Data, frame.data())
+    }?;
+    let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+    let time = i64::try_from(now.as_nanos() / 1000 * 1000).ok().map(Time);
+    Some(Record { time, ..Record::new(frame) })
+}
+
+pub(super) fn run(
+    out: &Output,
+    global: &Global,
+    line: &CanLine,
+    path: &Path,
+    run: &Stream,
+) -> Result<(), Exit> {
+    let format = format_of(path)?;
+    let limit = run.seconds.map(|seconds| duration("--for", seconds)).transpose()?;
+    let endpoint = endpoint(global, line)?;
+    let name = path.display().to_string();
+    let trouble = |error: io::Error| Exit::file(&name, &error);
+    let mut port = open(&endpoint).map_err(|error| Exit::trouble(error.to_string()))?;
+    let mut writer = Writer::new(BufWriter::new(File::create(path).map_err(trouble)?), format);
+    let stop = stop_flag()?;
+    let text = endpoint.to_string();
+    out.document(json!({ "event": "ready", "endpoint": text, "file": name }), || {
+        println!("recording {text} to {name}");
+    });
+    let (start, mut frames) = (Instant::now(), 0u64);
+    while !stop.load(Ordering::Relaxed) {
+        let left = limit.map_or(Duration::MAX, |limit| limit.saturating_sub(start.elapsed()));
+        if left.is_zero() {
+            break;
+        }
+        match port.receive(left.min(STEP)).map_err(|error| gone(&error))? {
+            Some(Event::Frame(frame)) => {
+                if let Some(record) = record(&frame) {
+                    writer.write(&record, None).map_err(trouble)?;
+                    frames += 1;
+                }
+            }
+            Some(Event::Bus(event)) => out.remark(event.to_string()),
+            _ => {}
+        }
+    }
+    writer.finish().map_err(trouble)?;
+    out.document(json!({ "event": "recorded", "frames": frames }), || println!("{frames} frames"));
+    Ok(())
+}
