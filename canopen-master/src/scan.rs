@@ -12,9 +12,6 @@ use crate::sdo::{AbortCode, Buffer};
 /// Time that a node has for each answer (decision 15).
 pub const ANSWER: Duration = Duration::from_millis(50);
 
-/// Requests of a scan that may wait to be sent (decision 15): the transmit queue stays shorter than 8.
-pub(crate) const WAITING: usize = 7;
-
 /// Device type (1000h).
 pub(crate) const DEVICE_TYPE: Address = Address::new(0x1000, 0);
 /// Device name (1008h).

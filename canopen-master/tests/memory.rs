@@ -152,7 +152,7 @@ fn nothing_is_allocated_after_construction() {
             let _ = master.upload(NodeId::MIN, Address::new(0x1008, 0), Small::EMPTY, &Options::default());
         }
         if step == 2000 {
-            master.scan(now, NodeSet::ALL, scan::Options::default()).unwrap();
+            master.scan(NodeSet::ALL, scan::Options::default()).unwrap();
             master.nmt(now, Command::Start, Target::All).unwrap();
         }
         frames += exchange(now, &mut master, &mut slave, |event| match event {

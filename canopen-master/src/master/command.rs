@@ -253,7 +253,7 @@ impl<'d, B: Buffer, const N: usize> Master<'d, B, N> {
     ///
     /// # Errors
     /// [`SubmitError::Scanning`], [`SubmitError::OffBus`], [`SubmitError::Node`].
-    pub fn scan(&mut self, now: Duration, nodes: NodeSet, options: scan::Options) -> Result<(), SubmitError> {
+    pub fn scan(&mut self, nodes: NodeSet, options: scan::Options) -> Result<(), SubmitError> {
         self.check_bus()?;
         if self.scan.is_some() {
             return Err(SubmitError::Scanning);
@@ -267,7 +267,7 @@ impl<'d, B: Buffer, const N: usize> Master<'d, B, N> {
             }
         }
         let empty = NodeSet::EMPTY;
-        let job = ScanJob { options, todo: nodes, active: empty, found: empty, silent: empty, next: now };
+        let job = ScanJob { options, todo: nodes, active: empty, found: empty, silent: empty };
         self.scan = Some(job);
         Ok(())
     }

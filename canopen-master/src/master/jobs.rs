@@ -7,13 +7,12 @@ use pdo::{Address, NodeId};
 use super::Master;
 use super::node::{Data, Job, ScanStep};
 use crate::boot::Action;
-use crate::clock::{after, is_due};
 use crate::guarding::Guard;
 use crate::heartbeat::Consumer;
 use crate::lss::{Identity, Part};
 use crate::nmt::Command;
 use crate::node_set::NodeSet;
-use crate::scan::{DEVICE_NAME, DEVICE_TYPE, Head, IDENTITY, Info, OPMODE, Options, WAITING};
+use crate::scan::{DEVICE_NAME, DEVICE_TYPE, Head, IDENTITY, Info, OPMODE, Options};
 use crate::sdo::{self, Buffer, Finished, Outcome};
 
 impl<'d, B: Buffer, const N: usize> Master<'d, B, N> {
@@ -111,17 +110,16 @@ impl<'d, B: Buffer, const N: usize> Master<'d, B, N> {
         self.due(at);
     }
 
-    /// Begins with the next node of a scan, if the queue is short enough.
-    pub(super) fn start_scan(&mut self, now: Duration) {
-        let Some(id) = self.scan_candidate() else { return };
-        let gap = self.config.frame_time();
-        let Some(scan) = self.scan.as_mut().filter(|scan| is_due(Some(scan.next), now)) else { return };
-        if self.sdo_ready.len() + self.queue.len() >= WAITING {
+    /// Begins with the next node of a scan, unless one that has begun still has to send something.
+    pub(super) fn start_scan(&mut self) {
+        if !self.sdo_ready.and(self.paced).is_empty() {
             return;
         }
-        scan.next = after(now, gap);
+        let Some(id) = self.scan_candidate() else { return };
+        let Some(scan) = &mut self.scan else { return };
         scan.todo.remove(id);
         scan.active.insert(id);
+        self.paced.insert(id);
         let timeout = scan.options.answer;
         if let Some(node) = self.node_mut(id) {
             node.job = Job::Scan(ScanStep::DeviceType);
@@ -129,9 +127,10 @@ impl<'d, B: Buffer, const N: usize> Master<'d, B, N> {
         self.job_transfer(id, DEVICE_TYPE, None, timeout);
     }
 
-    /// When the next node of a scan may be asked.
+    /// When the next frame of a scan may be sent.
     pub(super) fn scan_due(&self) -> Option<Duration> {
-        self.scan_candidate().and(self.scan.as_ref()).map(|scan| scan.next)
+        let waits = !self.sdo_ready.and(self.paced).is_empty() || self.scan_candidate().is_some();
+        waits.then(|| self.pace.opens())
     }
 
     fn scan_candidate(&self) -> Option<NodeId> {

@@ -4,6 +4,7 @@ mod command;
 mod event;
 mod jobs;
 mod node;
+mod pace;
 mod receive;
 mod timer;
 mod transmit;
@@ -28,6 +29,7 @@ pub use node::Image;
 
 use event::Notice;
 use node::{Job, Node};
+use pace::Pace;
 
 /// Frames of NMT, TIME and [`Master::send`] that wait to be sent. PDOs, guarding, SDO and boot wait
 /// where they arise, at most one frame per service and node.
@@ -49,7 +51,7 @@ pub struct Config {
     /// Time that a node has to show the state that an NMT command leads to; a node with a longer
     /// heartbeat or guarding time has that long.
     pub confirm: Duration,
-    /// Bits per second: paces scans to what the bus can carry.
+    /// Bits per second, or less: paces scans to what the bus can carry.
     pub bit_rate: u32,
     /// Times of LSS.
     pub lss: lss::Config,
@@ -59,13 +61,6 @@ pub struct Config {
 impl Default for Config {
     fn default() -> Self {
         Self { confirm: Duration::from_millis(500), bit_rate: 500_000, lss: lss::Config::default() }
-    }
-}
-
-impl Config {
-    /// The longest time of a frame with 8 bytes: 111 bits, 24 stuff bits.
-    fn frame_time(&self) -> Duration {
-        Duration::from_nanos(135 * 1_000_000_000 / u64::from(self.bit_rate.max(1)))
     }
 }
 
@@ -94,8 +89,6 @@ struct ScanJob {
     active: NodeSet,
     found: NodeSet,
     silent: NodeSet,
-    /// When the next node may be asked.
-    next: Duration,
 }
 
 impl ScanJob {
@@ -159,6 +152,9 @@ pub struct Master<'d, B, const N: usize> {
     nmt_waiting: NodeSet,
     next_ticket: u32,
     scan: Option<ScanJob>,
+    /// Nodes whose frames are a scan's, until all are sent.
+    paced: NodeSet,
+    pace: Pace,
     events: Ring<Notice, EVENTS>,
     lost_events: u32,
     bus: BusStatus,
@@ -215,6 +211,8 @@ impl<'d, B: Buffer, const N: usize> Master<'d, B, N> {
             nmt_waiting: NodeSet::EMPTY,
             next_ticket: 0,
             scan: None,
+            paced: NodeSet::EMPTY,
+            pace: Pace::new(config.bit_rate),
             events: Ring::new(),
             lost_events: 0,
             bus: BusStatus::Active,

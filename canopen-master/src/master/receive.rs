@@ -18,6 +18,9 @@ impl<'d, B: Buffer, const N: usize> Master<'d, B, N> {
     /// are the master's; anything else is ignored, so that other engines can share the bus.
     #[inline]
     pub fn handle_frame<F: embedded_can::Frame>(&mut self, now: Duration, frame: &F) -> Handled {
+        if !self.paced.is_empty() {
+            self.pace.hear(now, frame.dlc());
+        }
         let Id::Standard(id) = frame.id() else { return Handled::Ignored };
         let id = id.as_raw();
         if frame.is_remote_frame() {

@@ -7,6 +7,7 @@ use pdo::{Frame, Service};
 
 use super::Master;
 use super::event::Notice;
+use super::node::Job;
 use crate::guarding;
 use crate::nmt::{Command, Target};
 use crate::node_set::NodeSet;
@@ -21,6 +22,12 @@ impl<B: Buffer, const N: usize> Master<'_, B, N> {
             self.drain(now);
             return None;
         }
+        let frame = self.next_frame(now)?;
+        self.pace.hand_out(now);
+        Some(frame)
+    }
+
+    fn next_frame(&mut self, now: Duration) -> Option<Frame> {
         if let Some(frame) = self.refused.take() {
             return Some(frame);
         }
@@ -34,15 +41,21 @@ impl<B: Buffer, const N: usize> Master<'_, B, N> {
         if let Some(frame) = self.poll_output().or_else(|| self.poll_error_control()) {
             return Some(frame);
         }
-        if self.scan.is_some() {
-            self.start_scan(now);
+        let mut held = NodeSet::EMPTY;
+        if self.scan.is_some() || !self.paced.is_empty() {
+            if now >= self.pace.opens() {
+                self.start_scan();
+            } else {
+                held = self.paced;
+            }
         }
-        self.poll_sdo(now).or_else(|| self.lss.poll_transmit(now))
+        self.poll_sdo(now, held).or_else(|| self.lss.poll_transmit(now))
     }
 
     /// The adapter did not take the frame that was polled last: it goes first when it is asked for
     /// again.
     pub fn handle_refused(&mut self, frame: Frame) {
+        self.pace.take_back();
         if self.refused.replace(frame).is_some() {
             self.handle_discarded(1);
         }
@@ -73,29 +86,35 @@ impl<B: Buffer, const N: usize> Master<'_, B, N> {
     }
 
     #[inline]
-    fn poll_sdo(&mut self, now: Duration) -> Option<Frame> {
-        while let Some(id) = self.sdo_ready.after(self.sdo_turn) {
+    fn poll_sdo(&mut self, now: Duration, held: NodeSet) -> Option<Frame> {
+        while let Some(id) = self.sdo_ready.without(held).after(self.sdo_turn) {
             let Some(node) = self.nodes.get_mut(usize::from(id.raw()) - 1) else {
                 self.sdo_ready.remove(id);
                 continue;
             };
             let frame = node.sdo.poll_transmit(now);
             let at = node.sdo.poll_timeout();
+            let scanning = matches!(node.job, Job::Scan(_));
             self.due(at);
             match frame {
                 Some(frame) => {
                     self.sdo_turn = id;
                     return Some(frame);
                 }
-                None => self.sdo_ready.remove(id),
-            };
+                None => {
+                    self.sdo_ready.remove(id);
+                    if !scanning {
+                        self.paced.remove(id);
+                    }
+                }
+            }
         }
         None
     }
 
     /// The bus is away: transfers go on to their time-outs, their frames nowhere.
     fn drain(&mut self, now: Duration) {
-        while self.poll_sdo(now).is_some() || self.lss.poll_transmit(now).is_some() {
+        while self.poll_sdo(now, NodeSet::EMPTY).is_some() || self.lss.poll_transmit(now).is_some() {
             self.discarded = self.discarded.saturating_add(1);
         }
         // Nodes of a scan that have not been asked yet are as silent as the others.

@@ -21,7 +21,7 @@ fn bus_off_is_one_event_and_every_command_has_its_outcome() {
     let ticket = upload.unwrap();
     net.master.nmt(net.now, Command::Start, Target::All).unwrap();
     net.master.write_pdo(node(2), DefaultPdo::First, &[1, 2]).unwrap();
-    net.master.scan(net.now, NodeSet::up_to(node(2)), scan::Options::default()).unwrap();
+    net.master.scan(NodeSet::up_to(node(2)), scan::Options::default()).unwrap();
     net.master.handle_bus(net.now, BusStatus::Passive);
     net.master.handle_bus(net.now, BusStatus::Off);
     net.master.handle_bus(net.now, BusStatus::Off);

@@ -47,7 +47,7 @@ extern "C" fn _start() {
     black_box(master.download(node, at, black_box(Small::EMPTY), &options).is_ok());
     black_box(master.write_pdo(node, black_box(DefaultPdo::First), wire()).is_ok());
     black_box(master.boot(now(), node, black_box(&BOOT)).is_ok());
-    black_box(master.scan(now(), black_box(NodeSet::ALL), black_box(scan::Options::default())).is_ok());
+    black_box(master.scan(black_box(NodeSet::ALL), black_box(scan::Options::default())).is_ok());
     black_box(master.lss(black_box(Operation::Fastscan)).is_ok());
     loop {
         if let Some(frame) = Frame::data_frame(black_box(embedded_can_id()), wire().get(..8).unwrap_or(&[])) {

@@ -196,11 +196,11 @@ impl CanBus {
     }
 
     /// Scans the bus and boots what is found; done by itself after switching on.
-    pub fn scan(&mut self, now: Duration) {
+    pub fn scan(&mut self) {
         let expected = self.expected();
         let Engine::Master(master) = &mut self.engine else { return };
         // Refused while one is under way, or without a bus: what is expected stays silent then.
-        self.scanning = !expected.is_empty() && master.scan(now, expected, scan::Options::default()).is_ok();
+        self.scanning = !expected.is_empty() && master.scan(expected, scan::Options::default()).is_ok();
         self.ready = NodeSet::EMPTY;
         self.to_boot = NodeSet::EMPTY;
     }
@@ -216,7 +216,7 @@ impl CanBus {
             }
             Engine::Link(_) => {}
         }
-        self.scan(now);
+        self.scan();
     }
 
     /// Takes a frame.

@@ -255,9 +255,9 @@ impl<S: Storage, R: AsRef<[u8]> + AsMut<[u8]>> Controller<S, R> {
 
     /// Scans a bus, 0 or 1, by hand (4.3.4.4); to be called with all axes at standstill. Whether there is
     /// such a bus.
-    pub fn scan(&mut self, now: Duration, at: usize) -> bool {
+    pub fn scan(&mut self, at: usize) -> bool {
         let Some(bus) = self.buses.get_mut(at) else { return false };
-        bus.scan(now);
+        bus.scan();
         self.manual_scan = true;
         true
     }

@@ -69,10 +69,9 @@ fn show_states(session: &mut Session, nodes: NodeSet) -> Result<(), Exit> {
 pub(crate) fn scan(out: &Output, global: &Global, line: &CanLine, nodes: Option<&str>) -> Result<(), Exit> {
     let nodes = nodes.map_or(Ok(NodeSet::up_to(NodeId::MAX)), node_list)?;
     let mut session = Session::open(global, line)?;
-    let now = session.now();
     let answer = if global.timeout.is_some() { session.answer() } else { scan::ANSWER };
     let options = scan::Options { answer, identity: true, opmode: true };
-    session.master().scan(now, nodes, options).map_err(|error| Exit::trouble(error.to_string()))?;
+    session.master().scan(nodes, options).map_err(|error| Exit::trouble(error.to_string()))?;
     let found = session.wait(Duration::MAX, |event| match event {
         Event::Scanned { found, .. } => Some(found),
         _ => None,

@@ -6,6 +6,7 @@ use canopen_master::master::{BusStatus, Config, Event, Master};
 use canopen_master::sdo::{Options, Outcome};
 use canopen_master::{Address, NodeId};
 use motion_io::can::{BusEvent, BusState, Driver, Engine, Event as PortEvent, open};
+use motion_io::endpoint::CanEndpoint;
 use pdo::Frame;
 use serde_json::{Value, json};
 
@@ -140,7 +141,7 @@ pub(crate) struct Session {
 }
 
 /// The endpoint that `--can`, the environment or the configuration names.
-pub(crate) fn endpoint(global: &Global, line: &CanLine) -> Result<motion_io::endpoint::CanEndpoint, Exit> {
+pub(crate) fn endpoint(global: &Global, line: &CanLine) -> Result<CanEndpoint, Exit> {
     choose(global, line.endpoint.as_deref(), ChoiceOf::Can)?
         .parse()
         .map_err(|error: motion_io::endpoint::EndpointError| Exit::usage(error.to_string()))
@@ -177,11 +178,14 @@ impl Session {
         if !port.wait_for_peer(PEER).map_err(|error| gone(&error))? {
             return Err(Exit::trouble(format!("{endpoint}: nobody has opened the other end")));
         }
-        let config = Config {
+        let mut config = Config {
             confirm: answer,
             lss: canopen_master::lss::Config { answer, fastscan_step: FASTSCAN_STEP },
             ..Config::default()
         };
+        if let CanEndpoint::Slcan { bit_rate, .. } = endpoint {
+            config.bit_rate = bit_rate;
+        }
         let wire = Wire(Box::new(Master::new(config)));
         Ok(Self { driver: Driver::new(port), wire, answer, watched: None, mode: None })
     }
