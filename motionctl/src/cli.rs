@@ -67,6 +67,9 @@ pub(crate) enum Command {
         #[command(subcommand)]
         command: crate::can::cli::Can,
     },
+    /// Test a CANopen node against CiA 301 and its device file; it is reset, nothing is stored, and without
+    /// --yes nothing is written behind which outputs or axes may be
+    Conform(crate::conform::Conform),
     /// Virtual CAN buses for other programs, over the socketcand protocol, until stopped
     Bus(crate::can::cli::Bus),
     /// Serial ports found

@@ -8,6 +8,7 @@
 
 mod can;
 mod cli;
+mod conform;
 mod connect;
 mod decode;
 mod demo;
@@ -37,6 +38,7 @@ fn main() -> ExitCode {
         Command::Run(arguments) => run::run(&out, &arguments),
         Command::Sim { command } => sim::run(&out, &cli.global, &command),
         Command::Can { command } => can::run(&out, &cli.global, &command),
+        Command::Conform(arguments) => conform::run(&out, &cli.global, &arguments),
         Command::Bus(arguments) => can::bus::run(&out, &arguments),
         Command::Ports => ports(&out),
         Command::Lb2 { command } => lb2::run(&out, &cli.global, &command),

@@ -218,3 +218,43 @@ fn channels_of_can_link() {
         assert_eq!(net.run(&["link", "set", channel, data]).status.code(), Some(2), "{wrong:?}");
     }
 }
+
+/// A node passes by its own device file, and does not by one that says more than it has.
+#[test]
+fn conformance_of_a_node() {
+    let mut bench = Bench::new();
+    bench.sim(&["io", "--node", "5", "--write-eds", "io.eds"]);
+    let path = |name: &str| bench.directory.path().join(name);
+    let conform = |eds: &str, more: &[&str], status| {
+        let output = Command::new(env!("CARGO_BIN_EXE_motionctl"))
+            .args(["--json", "conform", "--can", &bench.endpoint, "--node", "5", "--timeout", "5"])
+            .args(["--eds", path(eds).to_str().unwrap()])
+            .args(more)
+            .current_dir(bench.directory.path())
+            .output()
+            .unwrap();
+        let error = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(status), "{error}");
+        serde_json::from_slice::<Value>(&output.stdout).unwrap()
+    };
+    let plan = conform("io.eds", &["--dry-run"], 0);
+    assert_eq!(plan["checks"][0]["id"], "nmt.boot-up");
+    let report = conform("io.eds", &["--junit", "report.xml"], 0);
+    assert_eq!(report["failed"], 0);
+    assert!(report["passed"].as_u64().unwrap() > 400);
+    let junit = std::fs::read_to_string(path("report.xml")).unwrap();
+    assert!(junit.contains("failures=\"0\"") && junit.contains("CiA 301, 7.2.8.3.3"));
+
+    let eds = std::fs::read_to_string(path("io.eds")).unwrap();
+    let more = "\r\n[2F00]\r\nParameterName=not there\r\nDataType=7\r\nAccessType=rw\r\n";
+    let list = eds.replace(
+        "[ManufacturerObjects]\r\nSupportedObjects=1\r\n1=0x2000",
+        "[ManufacturerObjects]\r\nSupportedObjects=2\r\n1=0x2000\r\n2=0x2F00",
+    );
+    assert_ne!(list, eds);
+    std::fs::write(path("more.eds"), list + more).unwrap();
+    let report = conform("more.eds", &[], 1);
+    let failed: Vec<_> =
+        report["cases"].as_array().unwrap().iter().filter(|case| case["outcome"] == "failed").collect();
+    assert_eq!((failed.len(), &failed[0]["id"]), (1, &json!("object.2F00.00.read")), "{failed:?}");
+}

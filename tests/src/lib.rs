@@ -1,3 +1,6 @@
-//! Helpers shared by the whole-family tests and the fuzz targets.
+//! Conformance: a test of any CANopen node against the standard and its device file ([`node`]), and its
+//! report ([`report`]). What the whole-family tests and the fuzz targets share is here, too.
 
 pub mod fuzz;
+pub mod node;
+pub mod report;

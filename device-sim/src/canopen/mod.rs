@@ -5,6 +5,7 @@
 //! Every node has stores for tests at 2000h:01 (64 KiB) and :02 (1 MiB), and a text longer than four bytes at 100Ah.
 
 mod common;
+mod description;
 mod drive;
 mod file;
 mod io;
@@ -19,6 +20,7 @@ use canopen_master::emcy::Emergency;
 use canopen_master::nmt::State;
 use canopen_master::sdo::AbortCode;
 
+pub use description::device_file;
 pub use drive::{Fault, Ld2000};
 pub use file::{FileNode, FileNodeError};
 pub use io::RemoteIo;

@@ -35,6 +35,9 @@ pub(crate) struct SimNode {
     /// Serial number (1018h:04)
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub(crate) serial_number: u32,
+    /// Write the node's device file (EDS) first
+    #[arg(long, value_name = "FILE")]
+    pub(crate) write_eds: Option<PathBuf>,
 }
 
 #[derive(Debug, Clone, Args)]

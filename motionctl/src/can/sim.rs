@@ -3,7 +3,8 @@
 use core::sync::atomic::Ordering;
 use core::time::Duration;
 
-use device_sim::canopen::{Device, FileNode, Ld2000, Node, RemoteIo};
+use canopen_master::eds::write_eds;
+use device_sim::canopen::{Device, FileNode, Ld2000, Node, RemoteIo, device_file};
 use motion_io::can::{BusEvent, Driver, open};
 use pdo::NodeId;
 use serde_json::json;
@@ -13,7 +14,7 @@ use super::session::{endpoint, node_id};
 use super::stop_flag;
 use crate::cli::Global;
 use crate::exit::Exit;
-use crate::output::Output;
+use crate::output::{Output, write_beside};
 
 /// Longest time between two looks at the stop signal.
 const STEP: Duration = Duration::from_millis(100);
@@ -49,6 +50,10 @@ fn run<D: Device>(
     kind: &str,
     mut node: Node<D>,
 ) -> Result<(), Exit> {
+    if let Some(path) = &arguments.write_eds {
+        let name = path.file_stem().map_or(kind.into(), |stem| stem.to_string_lossy().into_owned());
+        write_beside(path, write_eds(&device_file(&node, &name)).as_bytes())?;
+    }
     let endpoint = endpoint(global, &arguments.line)?;
     let stop = stop_flag()?;
     let port = open(&endpoint).map_err(|error| Exit::trouble(error.to_string()))?;

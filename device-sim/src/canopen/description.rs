@@ -1,0 +1,83 @@
+//! The device file of a virtual node, made of its objects.
+
+use canopen_master::data_type::DataType;
+use canopen_master::eds::{Access, Device, Entry, Fields, Object, ObjectType, PdoMapping};
+
+use super::objects;
+use super::{Device as Behaviour, Node};
+
+/// What a master needs to know of the node. To be asked of a node before it starts: then its values are
+/// those of a device that was never configured.
+#[must_use]
+pub fn device_file<D: Behaviour>(node: &Node<D>, name: &str) -> Device {
+    let all = node.objects();
+    let mut device = Device {
+        file_info: Fields::from_iter([("FileName", format!("{name}.eds")), ("EDSVersion", "4.0".into())]),
+        device_info: Fields::from_iter([
+            ("VendorName", "device-sim".to_owned()),
+            ("VendorNumber", format!("{:#X}", all.get(0x1018, 1))),
+            ("ProductName", name.to_owned()),
+            ("ProductNumber", format!("{:#X}", all.get(0x1018, 2))),
+            ("RevisionNumber", format!("{:#X}", all.get(0x1018, 3))),
+            ("LSS_Supported", "1".into()),
+        ]),
+        ..Device::default()
+    };
+    for (at, entry) in all.iter() {
+        let described = describe(at.index, at.sub, entry);
+        match device.objects.last_mut().filter(|object| object.index == at.index) {
+            Some(object) => {
+                if object.subs.is_empty() {
+                    object.own.object_type = ObjectType::RECORD;
+                    let mut first = core::mem::replace(&mut object.own, Entry::new(0));
+                    object.own.name = format!("{:04X}h", at.index);
+                    object.own.object_type = ObjectType::RECORD;
+                    first.object_type = ObjectType::VAR;
+                    object.insert(first);
+                }
+                object.insert(described);
+            }
+            None => {
+                let mut object = Object::new(at.index);
+                object.own = described;
+                device.objects.push(object);
+            }
+        }
+    }
+    device
+}
+
+fn describe(index: u16, sub: u8, object: &objects::Entry) -> Entry {
+    let rights = object.rights;
+    let mut entry = Entry::new(sub);
+    entry.name = format!("{index:04X}h:{sub:02X}");
+    entry.object_type =
+        if object.data_type == DataType::DOMAIN { ObjectType::DOMAIN } else { ObjectType::VAR };
+    entry.data_type = Some(object.data_type);
+    entry.access = Some(match (rights.read, rights.write) {
+        (true, true) => Access::ReadWrite,
+        (false, true) => Access::WriteOnly,
+        _ => Access::ReadOnly,
+    });
+    entry.pdo_mapping =
+        Some(if rights.transmit || rights.receive { PdoMapping::Optional } else { PdoMapping::No });
+    if let Some((low, high)) = object.limits {
+        (entry.low_limit, entry.high_limit) = (Some(low.to_string()), Some(high.to_string()));
+    }
+    // Identifiers that the node makes of its address when it starts.
+    let own = match (index, sub) {
+        (0x1014, 0) => Some(0x80),
+        (0x1400..=0x1403, 1) => Some(0x200 + 0x100 * u32::from(index & 3)),
+        (0x1800..=0x1803, 1) => Some(0x180 + 0x100 * u32::from(index & 3)),
+        _ => None,
+    };
+    entry.default = match own {
+        Some(base) => Some(format!("$NODEID+{:#X}", object.get() as u32 | base)),
+        None if object.data_type == DataType::VISIBLE_STRING => {
+            Some(String::from_utf8_lossy(&object.value).into_owned())
+        }
+        None if object.data_type.size().is_some() => Some(object.get().to_string()),
+        None => None,
+    };
+    entry
+}

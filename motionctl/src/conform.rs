@@ -1,0 +1,106 @@
+//! `motionctl conform`: a small conformance test of one node.
+
+use core::time::Duration;
+use std::path::PathBuf;
+
+use canopen_master::eds;
+use clap::Args;
+use conformance::node::{Config, Line, TestError, checks, test};
+use conformance::report::{Case, Outcome, counts, json as report_json, junit};
+use motion_io::can::open;
+use serde_json::json;
+
+use crate::can::cli::CanLine;
+use crate::can::session::{answer_time, endpoint, node_id};
+use crate::cli::Global;
+use crate::exit::Exit;
+use crate::output::{Output, write_beside};
+
+/// Where we are the adapter, a host has so long to open its end.
+const PEER: Duration = Duration::from_secs(10);
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct Conform {
+    #[command(flatten)]
+    line: CanLine,
+    /// Node ID
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=127))]
+    node: u8,
+    /// Its device file: EDS, DCF or XDD
+    #[arg(long, value_name = "FILE")]
+    eds: PathBuf,
+    /// Write the report as JUnit XML, too
+    #[arg(long, value_name = "FILE")]
+    junit: Option<PathBuf>,
+}
+
+pub(crate) fn run(out: &Output, global: &Global, arguments: &Conform) -> Result<(), Exit> {
+    let name = arguments.eds.display().to_string();
+    let bytes = std::fs::read(&arguments.eds).map_err(|error| Exit::file(&name, &error))?;
+    let device = eds::read(&bytes).map_err(|error| Exit::file(&name, &error))?.device;
+    if global.dry_run {
+        plan(out, arguments.node, &device);
+        return Ok(());
+    }
+    let config = Config {
+        node: node_id(arguments.node)?,
+        device: &device,
+        answer: answer_time(global)?,
+        permitted: global.yes,
+    };
+    let endpoint = endpoint(global, &arguments.line)?;
+    let trouble = |error: std::io::Error| Exit::trouble(format!("{endpoint}: {error}"));
+    let mut port = open(&endpoint).map_err(|error| Exit::trouble(error.to_string()))?;
+    if !port.wait_for_peer(PEER).map_err(trouble)? {
+        return Err(Exit::trouble(format!("{endpoint}: nobody has opened the other end")));
+    }
+    let cases = test(&mut Line::new(port), &config, |case| tell(out, case)).map_err(|error| match error {
+        TestError::Io(error) => trouble(error),
+        TestError::Silent(_) => Exit { status: 3, message: error.to_string() },
+        _ => Exit::usage(format!("{error}: --yes gives it")),
+    })?;
+    if let Some(path) = &arguments.junit {
+        write_beside(path, junit(&format!("node {}", arguments.node), &cases).as_bytes())?;
+    }
+    let (passed, failed, skipped) = counts(&cases);
+    let document = json!({
+        "node": arguments.node,
+        "eds": name,
+        "passed": passed,
+        "failed": failed,
+        "skipped": skipped,
+        "cases": report_json(&cases),
+    });
+    out.document(document, || println!("{passed} passed, {failed} failed, {skipped} skipped"));
+    if failed == 0 { Ok(()) } else { Err(Exit::check(format!("{failed} of {} cases failed", cases.len()))) }
+}
+
+/// What passed of the many objects is only counted.
+fn tell(out: &Output, case: &Case) {
+    let Case { id, title, clause, outcome, .. } = case;
+    match outcome {
+        Outcome::Passed if id.starts_with("object.") => {}
+        Outcome::Passed => out.say(&format!("passed   {id}: {title} ({clause})")),
+        Outcome::Failed(why) => out.say(&format!("FAILED   {id}: {title} ({clause})\n         {why}")),
+        Outcome::Skipped(why) => out.say(&format!("skipped  {id}: {why}")),
+    }
+}
+
+fn plan(out: &Output, node: u8, device: &eds::Device) {
+    let values: usize = device.objects.iter().map(|object| object.entries().len()).sum();
+    let list: Vec<_> = checks()
+        .iter()
+        .map(|check| {
+            json!({ "id": check.id, "title": check.title, "clause": check.clause, "touches": check.touches })
+        })
+        .collect();
+    out.document(json!({ "node": node, "objects": values, "checks": list }), || {
+        println!("would test node {node}:");
+        for check in checks() {
+            let touches = if check.touches.is_empty() { "only reads" } else { check.touches };
+            println!("  {}: {} ({})\n    {touches}", check.id, check.title, check.clause);
+        }
+        println!("  and each of {values} values of the device file, read and written as its access says");
+        println!("    writes nothing but what it has read; outside 1000h to 1FFFh only with --yes");
+    });
+}
