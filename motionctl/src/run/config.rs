@@ -20,6 +20,7 @@ pub(super) struct Config {
     pub(super) serial: Vec<Serial>,
     pub(super) can1: Option<Can>,
     pub(super) can2: Option<Can>,
+    pub(super) extension: Option<Extension>,
     #[serde(default)]
     parameters: BTreeMap<String, Setting>,
     #[serde(default)]
@@ -112,6 +113,36 @@ impl Can {
             _ => {}
         }
         Ok(endpoint)
+    }
+}
+
+/// What is in the extension slot (6.9).
+#[derive(Debug, Clone, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+pub(super) enum Extension {
+    /// Modbus TCP: the process image as registers.
+    ModbusTcp {
+        /// HOST:PORT.
+        listen: String,
+        /// Unit number; 0 answers all.
+        #[serde(default)]
+        unit: u8,
+        /// Seconds without a request after which axes are halted.
+        #[serde(default = "watchdog")]
+        watchdog: f64,
+    },
+}
+
+const fn watchdog() -> f64 {
+    1.0
+}
+
+impl Extension {
+    pub(super) fn open(&self) -> Result<super::modbus::Server, Exit> {
+        let Self::ModbusTcp { listen, unit, watchdog } = self;
+        let watchdog = Duration::try_from_secs_f64(*watchdog)
+            .map_err(|error| Exit::usage(format!("[extension] watchdog = {watchdog}: {error}")))?;
+        super::modbus::Server::listen(listen, *unit, watchdog)
     }
 }
 

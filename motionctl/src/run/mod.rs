@@ -3,9 +3,11 @@
 mod buses;
 pub(crate) mod cli;
 mod config;
+mod modbus;
 mod pace;
 mod plants;
 mod program;
+mod remote;
 mod report;
 mod serial;
 
@@ -95,6 +97,13 @@ fn control(
     set_up(&mut controller, config)?;
     let mut machine = plants::machine(&config.simulate)?;
     let mut program = Program::new(&config.program);
+    let mut extension = config.extension.as_ref().map(config::Extension::open).transpose()?;
+    if let Some(server) = &mut extension {
+        // The sizes of the images are known before anybody knows the address.
+        controller.exchange(server);
+        out.say(&format!("Modbus TCP at {}", server.address()));
+        program = program.with_remote();
+    }
     let mut lines = Vec::new();
     for serial in &config.serial {
         let endpoint = serial.endpoint()?;
@@ -133,6 +142,9 @@ fn control(
             }
         }
         let inputs = machine.run(cycle.as_millis() as u32, &outputs);
+        if let Some(bus) = &mut extension {
+            controller.exchange(bus);
+        }
         outputs = controller.cycle(now, &inputs, &mut program);
         for (at, port) in &connected {
             if let Some(bus) = controller.bus(*at) {

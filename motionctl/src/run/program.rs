@@ -8,6 +8,7 @@ use motion_core::application::blocks::{
 use motion_core::application::{Application, MotionError, Plc, State};
 
 use super::config::{Action, Step};
+use super::remote::Remote;
 
 /// A step's function block: runs one cycle, with its inputs asked for or not.
 type Block = Box<dyn FnMut(&mut Plc<'_>, bool) -> Outputs>;
@@ -37,6 +38,8 @@ pub(super) struct Program {
     /// Every axis is brought to standstill and switched off.
     stopping: bool,
     stops: Vec<(Stop, Power)>,
+    /// Axes by way of the extension module.
+    remote: Option<Remote>,
     /// Steps that have ended: axis, action, outcome.
     pub(super) ended: Vec<(u8, Action, Outcome)>,
 }
@@ -52,6 +55,12 @@ impl Program {
             over: false,
         });
         Self { steps: steps.collect(), ..Self::default() }
+    }
+
+    /// With axes that the extension module's process image moves.
+    pub(super) fn with_remote(mut self) -> Self {
+        self.remote = Some(Remote::new());
+        self
     }
 
     /// Lets the next cycle begin at `now`.
@@ -87,6 +96,9 @@ impl Application for Program {
     fn cycle(&mut self, plc: &mut Plc<'_>) {
         if self.stopping {
             return self.bring_to_standstill(plc);
+        }
+        if let Some(remote) = &mut self.remote {
+            remote.cycle(plc);
         }
         for step in &mut self.steps {
             if step.over || self.now < step.begin {

@@ -1,0 +1,316 @@
+//! Modbus TCP in the extension slot (manual A 6.9.4, Ethernet): the process image as registers.
+//!
+//! Input registers (function 04h) are the output image, what the controller says; holding registers
+//! (03h, 06h, 10h) are the input image, what it is told. Register n holds bytes 2n and 2n + 1, the first
+//! one as its high byte. What lies beyond the sizes `[060]`, `[061]` is refused as an illegal data address.
+
+use core::net::SocketAddr;
+use core::sync::atomic::{AtomicBool, Ordering};
+use core::time::Duration;
+use std::io::{self, Read, Write};
+use std::net::{TcpListener, TcpStream};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
+use std::time::Instant;
+
+use motion_core::io::{BusKind, FieldBus, MAX_IMAGE};
+use rmodbus::consts::ModbusFunction;
+use rmodbus::server::{ModbusFrame, Read as Wanted, Write as Given};
+use rmodbus::{ErrorKind, ModbusProto};
+
+use crate::exit::Exit;
+
+/// Bytes before the part that the header's length counts.
+const HEADER: usize = 6;
+/// Longest request or answer of Modbus TCP.
+const LONGEST: usize = 260;
+/// Clients at one time.
+const CLIENTS: usize = 8;
+/// How long a thread waits before it looks whether it is to end.
+const LOOK: Duration = Duration::from_millis(100);
+
+#[derive(Debug)]
+struct Images {
+    /// From the bus to the controller; as long as `[060]` says.
+    input: [u8; MAX_IMAGE],
+    output: [u8; MAX_IMAGE],
+    sizes: (usize, usize),
+    /// The last request.
+    heard: Option<Instant>,
+}
+
+/// The server, until dropped.
+#[derive(Debug)]
+pub(super) struct Server {
+    images: Arc<Mutex<Images>>,
+    stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+    address: SocketAddr,
+    /// Without a request for so long the bus is not in data exchange.
+    watchdog: Duration,
+}
+
+fn lock(images: &Mutex<Images>) -> std::sync::MutexGuard<'_, Images> {
+    images.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Server {
+    /// Listens at `HOST:PORT` as this unit; 0 answers every unit number.
+    pub(super) fn listen(address: &str, unit: u8, watchdog: Duration) -> Result<Self, Exit> {
+        let trouble = |error: io::Error| Exit::file(&format!("Modbus TCP at {address}"), &error);
+        let listener = TcpListener::bind(address).map_err(trouble)?;
+        listener.set_nonblocking(true).map_err(trouble)?;
+        let bound = listener.local_addr().map_err(trouble)?;
+        let images = Images { input: [0; MAX_IMAGE], output: [0; MAX_IMAGE], sizes: (0, 0), heard: None };
+        let images = Arc::new(Mutex::new(images));
+        let stop = Arc::new(AtomicBool::new(false));
+        let (shared, flag) = (Arc::clone(&images), Arc::clone(&stop));
+        let thread = std::thread::spawn(move || accept(&listener, unit, &shared, &flag));
+        Ok(Self { images, stop, thread: Some(thread), address: bound, watchdog })
+    }
+
+    /// Where it listens.
+    pub(super) const fn address(&self) -> SocketAddr {
+        self.address
+    }
+}
+
+impl FieldBus for Server {
+    fn kind(&self) -> BusKind {
+        BusKind::Ethernet
+    }
+
+    fn exchange(&mut self, output: &[u8], input: &mut [u8]) -> bool {
+        let mut images = lock(&self.images);
+        images.sizes = (input.len(), output.len());
+        images.output.iter_mut().zip(output).for_each(|(to, from)| *to = *from);
+        input.iter_mut().zip(&images.input).for_each(|(to, from)| *to = *from);
+        images.heard.is_some_and(|heard| heard.elapsed() < self.watchdog)
+    }
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+/// Takes clients until the flag is set.
+fn accept(listener: &TcpListener, unit: u8, images: &Arc<Mutex<Images>>, stop: &Arc<AtomicBool>) {
+    let mut clients: Vec<JoinHandle<()>> = Vec::new();
+    while !stop.load(Ordering::Relaxed) {
+        clients.retain(|client| !client.is_finished());
+        match listener.accept() {
+            // One too many is closed at once.
+            Ok((stream, _)) if clients.len() < CLIENTS => {
+                let (images, stop) = (Arc::clone(images), Arc::clone(stop));
+                clients.push(std::thread::spawn(move || {
+                    // A client that goes, in whatever way, is gone.
+                    let _ = serve(stream, unit, &images, &stop);
+                }));
+            }
+            Ok(_) => {}
+            Err(_) => std::thread::sleep(LOOK),
+        }
+    }
+    for client in clients {
+        let _ = client.join();
+    }
+}
+
+/// Fills `buffer`; false when the client has gone or the server ends.
+fn fill(stream: &mut TcpStream, buffer: &mut [u8], stop: &AtomicBool) -> io::Result<bool> {
+    let mut filled = 0;
+    while let Some(rest) = buffer.get_mut(filled..).filter(|rest| !rest.is_empty()) {
+        match stream.read(rest) {
+            Ok(0) => return Ok(false),
+            Ok(count) => filled += count,
+            Err(error) if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut) => {
+                if stop.load(Ordering::Relaxed) {
+                    return Ok(false);
+                }
+            }
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(true)
+}
+
+fn serve(mut stream: TcpStream, unit: u8, images: &Mutex<Images>, stop: &AtomicBool) -> io::Result<()> {
+    stream.set_nonblocking(false)?;
+    stream.set_read_timeout(Some(LOOK))?;
+    stream.set_nodelay(true)?;
+    let mut request = [0; LONGEST];
+    loop {
+        let (header, _) = request.split_at_mut(HEADER);
+        if !fill(&mut stream, header, stop)? {
+            return Ok(());
+        }
+        let len = usize::from(u16::from_be_bytes([request[4], request[5]]));
+        let Some(rest) = request.get_mut(HEADER..HEADER + len).filter(|_| len >= 2) else {
+            // Where the next request begins cannot be known.
+            return Ok(());
+        };
+        if !fill(&mut stream, rest, stop)? {
+            return Ok(());
+        }
+        let Some(request) = request.get(..HEADER + len) else { return Ok(()) };
+        let Ok(answer) = answer(request, unit, images) else { return Ok(()) };
+        stream.write_all(&answer)?;
+    }
+}
+
+/// The answer to a request; empty for one to another unit.
+fn answer(request: &[u8], unit: u8, images: &Mutex<Images>) -> Result<Vec<u8>, ErrorKind> {
+    let asked = request.get(HEADER).copied().unwrap_or(0);
+    if unit != 0 && asked != unit {
+        return Ok(Vec::new());
+    }
+    if let Some(code) = misshapen(request.get(HEADER + 1..).unwrap_or(&[])) {
+        let (transaction, function) = (request.get(..4), request.get(HEADER + 1));
+        let mut answer = transaction.unwrap_or(&[]).to_vec();
+        answer.extend([0, 3, asked, function.copied().unwrap_or(0) | 0x80, code]);
+        return Ok(answer);
+    }
+    let mut answer = Vec::with_capacity(LONGEST);
+    let mut frame = ModbusFrame::new(asked, request, ModbusProto::TcpUdp, &mut answer);
+    frame.parse()?;
+    if frame.processing_required {
+        let mut images = lock(images);
+        images.heard = Some(Instant::now());
+        let holding = matches!(frame.func, ModbusFunction::GetHoldings);
+        if frame.readonly {
+            let result = read(frame.get_external_read()?, holding, &images);
+            frame.process_external_read(result)?;
+        } else {
+            let result = frame.get_external_write().and_then(|given| write(&given, &mut images));
+            frame.process_external_write(result)?;
+        }
+    }
+    if frame.response_required {
+        frame.finalize_response()?;
+    }
+    Ok(answer)
+}
+
+/// The exception code that a request earns by its shape alone: a function that there is not (1), a count
+/// or a length that does not fit (3). The library relies on the counts being right.
+fn misshapen(request: &[u8]) -> Option<u8> {
+    let count = request.get(3..5).and_then(|count| count.try_into().ok()).map(u16::from_be_bytes);
+    let good = match (request.first()?, count) {
+        (3 | 4, Some(1..=125)) | (6, Some(_)) => request.len() == 5,
+        (16, Some(count @ 1..=123)) => {
+            let bytes = 2 * usize::from(count);
+            request.get(5).map(|bytes| usize::from(*bytes)) == Some(bytes) && request.len() == 6 + bytes
+        }
+        (3 | 4 | 6 | 16, _) => false,
+        _ => return Some(1),
+    };
+    (!good).then_some(3)
+}
+
+/// Bytes of `count` registers from `address` on, within an image of `size` bytes.
+fn place(address: u16, count: u16, size: usize) -> Result<core::ops::Range<usize>, ErrorKind> {
+    let begin = 2 * usize::from(address);
+    let end = begin + 2 * usize::from(count);
+    if end > size.next_multiple_of(2) { Err(ErrorKind::IllegalDataAddress) } else { Ok(begin..end) }
+}
+
+fn read(wanted: Wanted<'_>, holding: bool, images: &Images) -> Result<(), ErrorKind> {
+    let Wanted::Words(words) = wanted else { return Err(ErrorKind::IllegalFunction) };
+    let (image, size) =
+        if holding { (&images.input, images.sizes.0) } else { (&images.output, images.sizes.1) };
+    let from = image.get(place(words.address, words.count, size)?).ok_or(ErrorKind::IllegalDataAddress)?;
+    words.buf.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
+    Ok(())
+}
+
+fn write(given: &Given<'_>, images: &mut Images) -> Result<(), ErrorKind> {
+    let Given::Words(words) = given else { return Err(ErrorKind::IllegalFunction) };
+    if words.data.len() != 2 * usize::from(words.count) {
+        return Err(ErrorKind::IllegalDataValue);
+    }
+    let place = place(words.address, words.count, images.sizes.0)?;
+    let to = images.input.get_mut(place).ok_or(ErrorKind::IllegalDataAddress)?;
+    to.iter_mut().zip(words.data).for_each(|(to, from)| *to = *from);
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn images(input: usize, output: usize) -> Mutex<Images> {
+        let mut images =
+            Images { input: [0; MAX_IMAGE], output: [0; MAX_IMAGE], sizes: (input, output), heard: None };
+        images.output[..4].copy_from_slice(&[1, 2, 3, 4]);
+        Mutex::new(images)
+    }
+
+    fn ask(images: &Mutex<Images>, unit: u8, request: &[u8]) -> Vec<u8> {
+        let mut whole = vec![0, 7, 0, 0, 0, request.len() as u8];
+        whole.extend(request);
+        let answer = answer(&whole, unit, images).unwrap();
+        answer.get(HEADER..).unwrap_or(&[]).to_vec()
+    }
+
+    /// Application protocol specification 1.1b3, 6.3 to 6.12.
+    #[test]
+    fn registers_are_the_images() {
+        let images = images(4, 4);
+        assert_eq!(ask(&images, 1, &[1, 4, 0, 0, 0, 2]), [1, 4, 4, 1, 2, 3, 4]);
+        assert_eq!(
+            ask(&images, 1, &[1, 16, 0, 0, 0, 2, 4, 9, 8, 7, 6]),
+            [1, 16, 0, 0, 0, 2],
+            "written as a whole"
+        );
+        assert_eq!(ask(&images, 1, &[1, 6, 0, 1, 5, 5]), [1, 6, 0, 1, 5, 5]);
+        assert_eq!(ask(&images, 1, &[1, 3, 0, 0, 0, 2]), [1, 3, 4, 9, 8, 5, 5]);
+        assert_eq!(lock(&images).input[..4], [9, 8, 5, 5]);
+        assert!(lock(&images).heard.is_some());
+    }
+
+    #[test]
+    fn what_is_not_there_is_an_exception_and_changes_nothing() {
+        let images = images(4, 3);
+        assert_eq!(ask(&images, 1, &[1, 3, 0, 1, 0, 2]), [1, 0x83, 2], "one register beyond");
+        assert_eq!(
+            ask(&images, 1, &[1, 4, 0, 0, 0, 2]),
+            [1, 4, 4, 1, 2, 3, 4],
+            "an odd size: half a register"
+        );
+        assert_eq!(ask(&images, 1, &[1, 16, 0, 1, 0, 2, 4, 1, 1, 1, 1]), [1, 0x90, 2]);
+        assert_eq!(ask(&images, 1, &[1, 6, 0xFF, 0xFF, 1, 1]), [1, 0x86, 2]);
+        assert_eq!(ask(&images, 1, &[1, 1, 0, 0, 0, 1]), [1, 0x81, 1], "no coils");
+        assert_eq!(ask(&images, 1, &[1, 43, 14, 1, 0]), [1, 0xAB, 1], "unknown function");
+        assert_eq!(ask(&images, 1, &[1, 3, 0, 0, 0, 126]), [1, 0x83, 3], "more than fits an answer");
+        assert_eq!(
+            ask(&images, 1, &[1, 16, 0, 0, 0, 2, 200, 1, 2, 3, 4]),
+            [1, 0x90, 3],
+            "bytes that are not there"
+        );
+        assert_eq!(lock(&images).input[..4], [0; 4]);
+        assert!(ask(&images, 1, &[2, 3, 0, 0, 0, 1]).is_empty(), "another unit");
+        assert_eq!(ask(&images, 0, &[2, 3, 0, 0, 0, 1]), [2, 3, 2, 0, 0], "0 answers all");
+    }
+
+    #[test]
+    fn no_request_is_too_wild() {
+        let images = images(512, 512);
+        let mut random = 1u32;
+        for _ in 0..200_000 {
+            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            let mut request = random.to_be_bytes().repeat(4);
+            request.truncate(2 + (random >> 8) as usize % 14);
+            request[0] = 1;
+            request[1] %= 18;
+            let mut whole = vec![0, 7, 0, 0, 0, request.len() as u8];
+            whole.extend(&request);
+            let _ = answer(&whole, 1, &images);
+        }
+    }
+}
