@@ -15,4 +15,4 @@ pub use bits::{CRC15_POLYNOMIAL, WireBits, arbitration, crc15};
 pub use bus::{Bus, ErrorKind, Event, INTERMISSION, QUEUE, StationId, Statistics, TransmitError};
 pub use counters::{Counters, State};
 pub use faults::{Fault, Faults};
-pub use network::{Network, Node};
+pub use network::{Mailbox, Network, Node};

@@ -1,6 +1,7 @@
 //! Engines on one bus, on virtual time.
 
 use core::time::Duration;
+use std::collections::VecDeque;
 
 use pdo::Frame;
 
@@ -18,6 +19,32 @@ pub trait Node {
     fn poll_timeout(&self) -> Option<Duration>;
     /// What the bus says beside frames: errors, error states.
     fn handle_bus(&mut self, _now: Duration, _event: Event) {}
+}
+
+/// A station whose program looks after the bus only now and then, as one does that works in cycles: what
+/// is received waits for it, and what it sends is put here.
+#[derive(Debug, Default)]
+pub struct Mailbox {
+    /// Frames received and when, oldest first.
+    pub received: VecDeque<(Duration, Frame)>,
+    /// Frames to send.
+    pub to_send: VecDeque<Frame>,
+}
+
+impl Node for Mailbox {
+    fn handle_frame(&mut self, now: Duration, frame: &Frame) {
+        self.received.push_back((now, *frame));
+    }
+
+    fn handle_timeout(&mut self, _now: Duration) {}
+
+    fn poll_transmit(&mut self, _now: Duration) -> Option<Frame> {
+        self.to_send.pop_front()
+    }
+
+    fn poll_timeout(&self) -> Option<Duration> {
+        None
+    }
 }
 
 /// Nodes on a bus. The caller keeps the nodes; node `i` of the slice is station `i` of the bus.

@@ -1,12 +1,14 @@
 //! Many axes at once.
 
-use super::profile::{Profile, SIXTH};
+use super::math::lesser;
+use super::profile::{Phase, Profile, SIXTH};
 
 /// Axes of a bank.
 const LANES: usize = 64;
 
 /// The present phases of up to 64 profiles side by side, so that one loop without a branch evaluates all
-/// of them; more axes take more banks. Gives the same numbers as [`Profile::at`].
+/// of them; more axes take more banks. Gives the same numbers as [`Profile::at`], up to the rounding of
+/// their last digits; at rest exactly the same.
 ///
 /// The bank holds what the present phases need; the profiles stay with the caller, who gives them with
 /// every call in the order of the lanes.
@@ -14,16 +16,17 @@ const LANES: usize = 64;
 #[repr(align(64))]
 pub struct Bank {
     begin: [f64; LANES],
-    next: [f64; LANES],
-    origin: [f64; LANES],
     start: [f64; LANES],
     speed: [f64; LANES],
     half_acceleration: [f64; LANES],
     sixth_jerk: [f64; LANES],
     position: [f64; LANES],
     velocity: [f64; LANES],
-    cursor: [u8; LANES],
+    /// When each lane's phase is over, and when the first of them is.
+    next: [f64; LANES],
+    earliest: f64,
     started: [f64; LANES],
+    cursor: [u8; LANES],
 }
 
 impl Default for Bank {
@@ -42,16 +45,16 @@ impl Bank {
         let zero = [0.0; LANES];
         Self {
             begin: zero,
-            next: [f64::INFINITY; LANES],
-            origin: zero,
             start: zero,
             speed: zero,
             half_acceleration: zero,
             sixth_jerk: zero,
             position: zero,
             velocity: zero,
-            cursor: [0; LANES],
+            next: [f64::INFINITY; LANES],
+            earliest: f64::INFINITY,
             started: zero,
+            cursor: [0; LANES],
         }
     }
 
@@ -61,27 +64,16 @@ impl Bank {
             *cursor = 0;
             *started = now;
             self.load(lane, profile);
+            self.earliest = least(&self.next);
         }
     }
 
     /// Evaluates all axes at `now`, s, which must not go backwards.
     pub fn evaluate(&mut self, now: f64, profiles: &[Profile]) {
-        let mut due = self.sweep(now);
-        // Phases can be shorter than a cycle.
-        for _ in 0..=super::MAX_PHASES {
-            if due == 0 {
-                break;
-            }
-            for (lane, profile) in profiles.iter().enumerate().take(LANES) {
-                if self.next.get(lane).is_some_and(|next| now >= *next)
-                    && let Some(cursor) = self.cursor.get_mut(lane)
-                {
-                    *cursor += 1;
-                    self.load(lane, profile);
-                }
-            }
-            due = self.sweep(now);
+        if now >= self.earliest {
+            self.turn(now, profiles);
         }
+        self.sweep(now);
     }
 
     /// Positions evaluated last, units.
@@ -98,18 +90,36 @@ impl Bank {
 
     #[inline]
     #[expect(clippy::indexing_slicing, reason = "lane < LANES: all arrays are that long")]
-    fn sweep(&mut self, now: f64) -> usize {
-        let mut due = 0;
+    fn sweep(&mut self, now: f64) {
         for lane in 0..LANES {
+            // p = s + t·(v + t·(a/2 + t·j/6)), v + t·(a + t·j/2), with what both have in common.
             let time = now - self.begin[lane];
-            let (speed, half, sixth) =
-                (self.speed[lane], self.half_acceleration[lane], self.sixth_jerk[lane]);
-            self.position[lane] =
-                self.origin[lane] + (self.start[lane] + time * (speed + time * (half + time * sixth)));
-            self.velocity[lane] = speed + time * (2.0 * half + time * (3.0 * sixth));
-            due += u64::from(now >= self.next[lane]);
+            let slope = time * self.sixth_jerk[lane];
+            let half = self.half_acceleration[lane] + slope;
+            let mean = self.speed[lane] + time * half;
+            self.position[lane] = self.start[lane] + time * mean;
+            self.velocity[lane] = mean + time * (half + slope);
         }
-        due as usize
+    }
+
+    /// Goes on to the next phases where they are due.
+    fn turn(&mut self, now: f64, profiles: &[Profile]) {
+        let due = |mask: u64, (lane, next): (usize, &f64)| mask | u64::from(now >= *next) << lane;
+        let mut due = self.next.iter().enumerate().fold(0, due);
+        while due != 0 {
+            let lane = due.trailing_zeros() as usize;
+            due &= due - 1;
+            // Phases can be shorter than a cycle. The end, after the last, lasts for ever.
+            while let (Some(next), Some(profile)) = (self.next.get(lane), profiles.get(lane))
+                && now >= *next
+                && let Some(cursor) = self.cursor.get_mut(lane)
+                && usize::from(*cursor) < profile.phases().len()
+            {
+                *cursor += 1;
+                self.load(lane, profile);
+            }
+        }
+        self.earliest = least(&self.next);
     }
 
     fn load(&mut self, lane: usize, profile: &Profile) {
@@ -123,11 +133,7 @@ impl Bank {
             }
             None => {
                 let end = profile.end();
-                let phase = super::Phase {
-                    begin: profile.duration(),
-                    velocity: end.velocity,
-                    ..super::Phase::default()
-                };
+                let phase = Phase { begin: profile.duration(), velocity: end.velocity, ..Phase::default() };
                 (phase, end.position, f64::INFINITY)
             }
         };
@@ -138,10 +144,20 @@ impl Bank {
         };
         set(&mut self.begin, started + phase.begin);
         set(&mut self.next, next);
-        set(&mut self.origin, origin);
-        set(&mut self.start, phase.position);
+        set(&mut self.start, origin + phase.position);
         set(&mut self.speed, phase.velocity);
         set(&mut self.half_acceleration, phase.acceleration / 2.0);
         set(&mut self.sixth_jerk, phase.jerk * SIXTH);
     }
+}
+
+/// The least of all, eight side by side.
+fn least(times: &[f64; LANES]) -> f64 {
+    let mut least = [f64::INFINITY; 8];
+    for chunk in times.chunks_exact(least.len()) {
+        for (least, time) in least.iter_mut().zip(chunk) {
+            *least = lesser(*least, *time);
+        }
+    }
+    least.into_iter().fold(f64::INFINITY, lesser)
 }

@@ -1,9 +1,21 @@
-//! Roots that come out the same on every machine.
+//! Roots that come out the same on every machine, and extremes.
+
+/// The lesser of two numbers: one instruction, where `f64::min` looks for a NaN as well. `a` if one is.
+#[inline(always)]
+pub(super) fn lesser(a: f64, b: f64) -> f64 {
+    if b < a { b } else { a }
+}
+
+/// The greater of two numbers; `a` if one is a NaN.
+#[inline(always)]
+pub(super) fn greater(a: f64, b: f64) -> f64 {
+    if b > a { b } else { a }
+}
 
 /// Square root, correctly rounded everywhere (IEEE 754); 0 for what rounding made negative.
 #[inline]
 pub(super) fn sqrt(x: f64) -> f64 {
-    libm::sqrt(x.max(0.0))
+    libm::sqrt(greater(0.0, x))
 }
 
 /// Cube root of a positive normal number to a few units in the last place, 0 for others. Without a

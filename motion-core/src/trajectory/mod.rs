@@ -24,6 +24,7 @@ mod math;
 mod plan;
 mod profile;
 mod ramp;
+mod rest;
 mod search;
 mod solve;
 mod trapezoid;

@@ -2,7 +2,7 @@
 //! legs forward from the start and backward from the target, so that both ends are exact.
 
 use super::limits::Limits;
-use super::math::sqrt;
+use super::math::{greater, lesser, sqrt};
 use super::profile::{Phase, Profile, SIXTH, State};
 use super::ramp::{Bounds, Ramp, change_way, resting_velocity, restore, rise};
 use super::search;
@@ -29,21 +29,22 @@ struct Drive<'a> {
 impl Drive<'_> {
     #[inline(always)]
     fn leg(&mut self, time: f64, jerk: f64) {
-        if time > 0.0 {
-            let phase = self.put(self.state, jerk * self.jerk);
-            self.time += time;
-            self.state = phase.after(time);
-        }
+        let time = greater(0.0, time);
+        let phase = self.put(self.state, jerk * self.jerk, time);
+        self.state = phase.after(time);
     }
 
+    /// A phase of `time`. One without any is written over by the next: that costs less than a branch that
+    /// cannot be predicted.
     #[inline(always)]
-    fn put(&mut self, state: State, jerk: f64) -> Phase {
+    fn put(&mut self, state: State, jerk: f64, time: f64) -> Phase {
         let State { position, velocity, acceleration } = state;
         let phase = Phase { begin: self.time, position, velocity, acceleration, jerk };
         if let Some(slot) = self.profile.phases.get_mut(self.len) {
             *slot = phase;
-            self.len += 1;
+            self.len += usize::from(time > 0.0);
         }
+        self.time += time;
         phase
     }
 
@@ -60,11 +61,7 @@ impl Drive<'_> {
             self.state.velocity = velocity;
             self.state.acceleration = 0.0;
             let gap = self.profile.end.position - self.profile.start + (start - self.state.position);
-            let time = gap / velocity;
-            if time > 0.0 {
-                self.put(self.state, 0.0);
-                self.time += time;
-            }
+            self.put(self.state, 0.0, greater(0.0, gap / velocity));
         }
         self.profile.tail = self.len as u8;
     }
@@ -72,16 +69,16 @@ impl Drive<'_> {
     /// The stop at the target, from velocity `u` without acceleration, or from where the jerk −1 that
     /// comes from there has made it `a`; computed backward from the end.
     #[inline(always)]
-    fn stop(&mut self, u: f64, a: f64, fall: f64, sign: f64, velocity: Option<f64>) {
+    fn stop(&mut self, u: f64, a: f64, bounds: &Bounds, sign: f64, velocity: Option<f64>) {
         let scale = self.jerk * sign;
-        let peak = sqrt(u).min(fall);
-        let hold = if peak == fall { (u / peak - peak).max(0.0) } else { 0.0 };
+        let peak = lesser(bounds.fall, sqrt(u));
+        let hold = greater(0.0, u * bounds.per_fall - bounds.fall);
         // Velocity and way left, when the last leg begins, when the hold begins, and at `a`.
         let half = peak * peak * 0.5;
         let last = peak * half * (2.0 * SIXTH);
         let held = half + peak * hold;
         let way = last + hold * (half + held) * 0.5;
-        let first = peak + a;
+        let first = greater(0.0, peak + a);
         let start = u - a * a * 0.5;
         let whole = way + first * (held + first * (peak * 0.5 - first * SIXTH));
         let state = |way: f64, velocity: f64, acceleration: f64| State {
@@ -90,18 +87,9 @@ impl Drive<'_> {
             acceleration: acceleration * scale,
         };
         self.cruise(velocity, -whole * scale);
-        if first > 0.0 {
-            self.put(state(whole, start, a), -scale);
-            self.time += first;
-        }
-        if hold > 0.0 {
-            self.put(state(way, held, -peak), 0.0);
-            self.time += hold;
-        }
-        if peak > 0.0 {
-            self.put(state(last, half, -peak), scale);
-            self.time += peak;
-        }
+        self.put(state(whole, start, a), -scale, first);
+        self.put(state(way, held, -peak), 0.0, hold);
+        self.put(state(last, half, -peak), scale, peak);
         self.end();
     }
 
@@ -123,20 +111,21 @@ impl Drive<'_> {
         }
         self.cruise(velocity, state.position);
         for (leg, state) in ramp.legs().iter().zip(&states) {
-            self.put(*state, leg.jerk * self.jerk);
-            self.time += leg.time;
+            self.put(*state, leg.jerk * self.jerk, leg.time);
         }
         self.end();
     }
 }
 
 #[inline]
-fn normalise(limits: &Limits) -> (Bounds, f64) {
+pub(super) fn normalise(limits: &Limits) -> (Bounds, f64) {
     let scale = 1.0 / limits.jerk();
     let bounds = Bounds {
         velocity: limits.velocity() * scale,
         grow: limits.acceleration() * scale,
         fall: limits.deceleration() * scale,
+        per_grow: limits.jerk() / limits.acceleration(),
+        per_fall: limits.jerk() / limits.deceleration(),
     };
     (bounds, scale)
 }
@@ -176,21 +165,22 @@ impl Profile {
 
     #[inline]
     pub(super) fn plan_position(&mut self, from: &State, limits: &Limits, target: f64, velocity: f64) {
-        let (bounds, scale) = normalise(limits);
         self.end = State { position: target, velocity, acceleration: 0.0 };
+        if from.velocity == 0.0 && from.acceleration == 0.0 && velocity == 0.0 {
+            return self.plan_rest(limits);
+        }
+        let (bounds, scale) = normalise(limits);
         let mut drive = self.drive(from, limits.jerk(), scale, &bounds);
         let (v, a) = (drive.state.velocity * scale, drive.state.acceleration * scale);
         let d = (target - from.position - drive.state.position) * scale;
         let last = velocity * scale;
         let resting = resting_velocity(v, a);
         // The way of going to the final velocity at once tells the direction.
-        let (direct, size) = if last == 0.0 && v == 0.0 && a == 0.0 {
-            (0.0, 0.0)
-        } else if last == 0.0 {
+        let (direct, size) = if last == 0.0 {
             let sign = 1.0_f64.copysign(resting);
             let (v, a) = (v * sign, a * sign);
-            let way = solve::stop(v, a, bounds.fall) * sign;
-            (way, solve::stopping_way(v + a * a / 2.0, bounds.fall))
+            let rest = solve::stopping_way(v + a * a / 2.0, &bounds);
+            ((v * a + a * a * a * (2.0 * SIXTH) + rest) * sign, rest)
         } else {
             let way = change_way(v, a, last, &bounds);
             (way, way.abs())
@@ -204,10 +194,18 @@ impl Profile {
         }
         let way = target - from.position;
         drive.profile.overshoots = last == 0.0 && way * rest <= 0.0 && rest.abs() > TOUCH * size;
-        drive.push(1.0_f64.copysign(rest), scale, velocity, &bounds, way);
-        // Braking so hard that it turns before it can be released, perhaps beyond the target.
+        // A branch, so that the processor need not wait for the direction.
+        if rest > 0.0 {
+            drive.push::<true>(scale, velocity, &bounds, way);
+        } else {
+            drive.push::<false>(scale, velocity, &bounds, way);
+        }
+        // Braking so hard that it turns before it can be released, perhaps beyond the target. Until then
+        // the velocity is at most the start's, and the time less than the release would take.
         let start = resting_velocity(from.velocity * scale, from.acceleration * scale);
-        if last == 0.0 && from.velocity * way > 0.0 && from.velocity * start < 0.0 {
+        let reach = (from.velocity * from.acceleration * scale).abs();
+        let turns = (from.velocity * start < 0.0) & (from.velocity * way > 0.0);
+        if turns & (reach >= way.abs()) && last == 0.0 {
             self.overshoots |= self.first_turn().is_some_and(|turn| turn.abs() > way.abs());
         }
     }
@@ -235,10 +233,10 @@ impl Drive<'_> {
         self.end();
     }
 
-    /// In the direction `sign` as far as can be, then to the end. `way` leads from the profile's start
-    /// to its target.
-    #[inline]
-    fn push(&mut self, sign: f64, scale: f64, velocity: f64, bounds: &Bounds, way: f64) {
+    /// Forward or backward as far as can be, then to the end. `way` leads from the profile's start to its
+    /// target.
+    fn push<const FORWARD: bool>(&mut self, scale: f64, velocity: f64, bounds: &Bounds, way: f64) {
+        let sign = if FORWARD { 1.0 } else { -1.0 };
         let turn = sign * scale;
         let (mut v, mut a) = (self.state.velocity * turn, self.state.acceleration * turn);
         let last = velocity * turn;
@@ -246,7 +244,7 @@ impl Drive<'_> {
         if resting_velocity(v, a) > highest {
             // Too fast: down towards the highest velocity, from where the braking may go on.
             let excess = v - highest + a * a / 2.0;
-            let low = bounds.fall.min(sqrt(excess));
+            let low = lesser(bounds.fall, sqrt(excess));
             self.leg(a + low, -sign);
             if low == bounds.fall {
                 self.leg((excess - low * low) / low, 0.0);
@@ -275,7 +273,7 @@ impl Drive<'_> {
             }
         };
         if last == 0.0 {
-            self.stop(u, a, bounds.fall, sign, cruise);
+            self.stop(u, a, bounds, sign, cruise);
         } else {
             self.arrive(&Ramp::to(u - a * a * 0.5, a, last, sign, bounds), cruise);
         }

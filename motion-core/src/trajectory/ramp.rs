@@ -1,7 +1,7 @@
 //! The fastest change of velocity, in normalised units: jerk 1, so that velocities, accelerations and
 //! positions are those of the axis divided by its jerk, and times stay what they are.
 
-use super::math::sqrt;
+use super::math::{greater, lesser, sqrt};
 use super::profile::SIXTH;
 
 /// Normalised limits: what [`super::Limits`] says, divided by the jerk.
@@ -12,6 +12,9 @@ pub(super) struct Bounds {
     pub(super) grow: f64,
     /// Acceleration while the speed falls.
     pub(super) fall: f64,
+    /// 1/`grow` and 1/`fall`: a division costs as much as ten multiplications.
+    pub(super) per_grow: f64,
+    pub(super) per_fall: f64,
 }
 
 impl Bounds {
@@ -24,7 +27,7 @@ impl Bounds {
     /// What |a| may be when the velocity changes its sign.
     #[inline]
     pub(super) fn crossing(&self) -> f64 {
-        self.grow.min(self.fall)
+        lesser(self.grow, self.fall)
     }
 
     /// Whether a rise along v = `w` + a²/2 (jerk +1) reaches velocity 0 with more acceleration than
@@ -32,7 +35,8 @@ impl Bounds {
     #[inline]
     pub(super) fn crosses(&self, v: f64, a: f64, w: f64) -> bool {
         let most = self.crossing();
-        self.grow != self.fall && w < 0.0 && (a <= 0.0 || v < 0.0) && -2.0 * w > most * most
+        // One branch instead of five that cannot be predicted.
+        (self.grow != self.fall) & (w < 0.0) & ((a <= 0.0) | (v < 0.0)) & (-2.0 * w > most * most)
     }
 }
 
@@ -105,28 +109,28 @@ pub(super) fn rise(v: f64, a: f64, target: f64, bounds: &Bounds, mut leg: impl F
     if through_zero && target > half {
         // The acceleration has to be `most` at velocity 0, with the other bound on either side.
         let most = bounds.crossing();
-        let up = bounds.fall.min(sqrt(half - w));
+        let up = lesser(bounds.fall, sqrt(half - w));
         leg(up - a, 1.0);
         if up == bounds.fall {
             leg((half - w) / up - up, 0.0);
         }
         leg(up - most, -1.0);
-        single(most, target + half, bounds.grow, leg);
+        single(most, target + half, bounds.grow, bounds.per_grow, leg);
     } else {
         let falls = target <= 0.0 || through_zero;
-        single(a, target - w, if falls { bounds.fall } else { bounds.grow }, leg);
+        let bound = if falls { bounds.fall } else { bounds.grow };
+        let per_bound = if falls { bounds.per_fall } else { bounds.per_grow };
+        single(a, target - w, bound, per_bound, leg);
     }
 }
 
 /// Up from acceleration `a` to at most `bound` and back to none; `gain` is the gain of velocity as if it
 /// began at acceleration 0.
 #[inline(always)]
-fn single(a: f64, gain: f64, bound: f64, mut leg: impl FnMut(f64, f64)) {
-    let peak = sqrt(gain).min(bound);
+fn single(a: f64, gain: f64, bound: f64, per_bound: f64, mut leg: impl FnMut(f64, f64)) {
+    let peak = lesser(bound, sqrt(gain));
     leg(peak - a, 1.0);
-    if peak == bound {
-        leg(gain / bound - bound, 0.0);
-    }
+    leg(greater(0.0, gain * per_bound - bound), 0.0);
     leg(peak, -1.0);
 }
 
@@ -140,8 +144,11 @@ pub(super) fn resting_velocity(v: f64, a: f64) -> f64 {
 /// must cross velocity 0 with too much acceleration whatever is done counts as beyond.
 #[inline]
 pub(super) fn restore(v: f64, a: f64, bounds: &Bounds) -> Option<Leg> {
-    let bound = bounds.at(v, a);
     let size = a.abs();
+    if size <= bounds.crossing() {
+        return None;
+    }
+    let bound = bounds.at(v, a);
     let crosses_above =
         v * a < 0.0 && size > bounds.grow && size * size - bounds.grow * bounds.grow > 2.0 * v.abs();
     let goal = if crosses_above {

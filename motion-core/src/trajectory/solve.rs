@@ -6,7 +6,7 @@
 //! velocity is u = w + α² and the way F(α) = α³ + 2wα + G(u), counted from where the push had no
 //! acceleration; G(u) is the way from velocity u to a stop.
 
-use super::math::{cbrt, sqrt};
+use super::math::{cbrt, greater, lesser, sqrt};
 use super::profile::SIXTH;
 use super::ramp::Bounds;
 
@@ -23,14 +23,9 @@ pub(super) enum Peak {
 
 /// Way from velocity `u` without acceleration to a stop.
 #[inline]
-pub(super) fn stopping_way(u: f64, fall: f64) -> f64 {
-    if u <= fall * fall { u * sqrt(u) } else { u * (u / fall + fall) / 2.0 }
-}
-
-/// Way of the immediate stop from a state whose resting velocity is not negative.
-#[inline]
-pub(super) fn stop(v: f64, a: f64, fall: f64) -> f64 {
-    v * a + a * a * a * (2.0 * SIXTH) + stopping_way(v + a * a / 2.0, fall)
+pub(super) fn stopping_way(u: f64, bounds: &Bounds) -> f64 {
+    let held = 0.5 * (u * bounds.per_fall + bounds.fall);
+    u * if u <= bounds.fall * bounds.fall { sqrt(u) } else { held }
 }
 
 /// The peak of the fastest way from a state to a standstill `d` ahead; `d` is more than the way of
@@ -45,27 +40,27 @@ pub(super) fn peak(v: f64, a: f64, d: f64, bounds: &Bounds) -> Peak {
     // Through velocity 0, where the acceleration may be `most`. Short ways turn back before it.
     let most = bounds.crossing();
     let half = most * most / 2.0;
-    let first = half.min(bounds.velocity);
-    let alpha = bounds.fall.min(sqrt(first - w));
+    let first = lesser(half, bounds.velocity);
+    let alpha = lesser(bounds.fall, sqrt(first - w));
     let way = if alpha < bounds.fall {
-        alpha * (alpha * alpha + 2.0 * w) + stopping_way(first, bounds.fall)
+        alpha * (alpha * alpha + 2.0 * w) + stopping_way(first, bounds)
     } else {
-        held(w, first, alpha, bounds.fall)
+        held(w, first, alpha, bounds)
     };
     if k <= way || first < half {
         return push(w, a, k, bounds.fall, first, bounds);
     }
     // From (velocity 0, acceleration `most`) it is a push along w = −most²/2. The way to there is that
     // to the peak `half`, less what the jerk −1 still adds from `most` to 0, less the stop.
-    let there = way - stopping_way(half, bounds.fall) - most * most * most * (2.0 * SIXTH);
+    let there = way - stopping_way(half, bounds) - most * most * most * (2.0 * SIXTH);
     let k = k - there - half * most + most * most * most * SIXTH;
     push(-half, most, k, bounds.grow, bounds.velocity, bounds)
 }
 
 /// Way of a push that holds `bound`, up to the peak `u`, and the stop.
 #[inline]
-fn held(w: f64, u: f64, bound: f64, fall: f64) -> f64 {
-    u * (u / bound + bound) / 2.0 + stopping_way(u, fall) + held_part(w, bound)
+fn held(w: f64, u: f64, bound: f64, bounds: &Bounds) -> f64 {
+    u * (u / bound + bound) / 2.0 + stopping_way(u, bounds) + held_part(w, bound)
 }
 
 #[inline]
@@ -79,14 +74,14 @@ fn held_part(w: f64, bound: f64) -> f64 {
 fn push(w: f64, a: f64, k: f64, bound: f64, highest: f64, bounds: &Bounds) -> Peak {
     let fall = bounds.fall;
     let free = highest - w;
-    let top = bound.min(sqrt(free));
+    let top = lesser(bound, sqrt(free));
     let u = w + top * top;
-    if u >= 0.0 && k < top * (top * top + 2.0 * w) + stopping_way(u, fall) {
-        let alpha = triangle(w, a, top, k, fall);
+    if (u >= 0.0) & (k < top * (top * top + 2.0 * w) + stopping_way(u, bounds)) {
+        let alpha = triangle(w, a, top, k, bounds);
         return if alpha < 0.0 { Peak::Release(alpha) } else { Peak::Velocity(w + alpha * alpha) };
     }
     if free > bound * bound {
-        let k = (k - held_part(w, bound)).max(0.0);
+        let k = greater(0.0, k - held_part(w, bound));
         let root = sqrt(2.0 * bound * k);
         let s = 2.0 * root / (bound + sqrt(bound * bound + 4.0 * root));
         let u = if s <= fall {
@@ -97,7 +92,7 @@ fn push(w: f64, a: f64, k: f64, bound: f64, highest: f64, bounds: &Bounds) -> Pe
             2.0 * k / (b + sqrt(b * b + 2.0 * c * k))
         };
         if u < highest {
-            return Peak::Velocity(u.max(0.0));
+            return Peak::Velocity(greater(0.0, u));
         }
     }
     Peak::Cruise
@@ -105,11 +100,12 @@ fn push(w: f64, a: f64, k: f64, bound: f64, highest: f64, bounds: &Bounds) -> Pe
 
 /// α in `low`…`high` with F(α) = `k`.
 #[inline]
-fn triangle(w: f64, low: f64, high: f64, k: f64, fall: f64) -> f64 {
+fn triangle(w: f64, low: f64, high: f64, k: f64, bounds: &Bounds) -> f64 {
+    let fall = bounds.fall;
     let brake = fall * fall;
     if w < 0.0 {
         // F is convex from u = 0 on, so Newton's way down from above cannot miss.
-        let low = low.max(sqrt(-w));
+        let low = greater(low, sqrt(-w));
         let full = sqrt(brake - w);
         let start = if high <= full || k <= full * (full * full + 2.0 * w) + fall * brake {
             // An upper bound of s = α + √u, and one step of s³ = 4k − 4ws + w²/s nearer.
@@ -120,26 +116,32 @@ fn triangle(w: f64, low: f64, high: f64, k: f64, fall: f64) -> f64 {
             let q = sqrt(fall * (2.0 * k - w * (2.0 * high + fall))) - w;
             half_root(fall, q)
         };
-        return descend(w, start.clamp(low, high), low, k, fall);
+        return descend(w, between(low, start, high), low, k, bounds);
     }
     if w == 0.0 {
         let alpha = cbrt(4.0 * k) / 2.0;
-        return if alpha <= fall { alpha } else { half_root(fall, sqrt(2.0 * fall * k)) }.clamp(low, high);
+        let alpha = if alpha <= fall { alpha } else { half_root(fall, sqrt(2.0 * fall * k)) };
+        return between(low, alpha, high);
     }
-    let flat = k >= stopping_way(w, fall);
+    let flat = k >= stopping_way(w, bounds);
     // The braking reaches its bound: for α ≥ 0 beyond √(D² − w), for α < 0 below its negative.
     let full = sqrt(brake - w);
     let side = if flat { full } else { -full };
     let limit = side * (side * side + 2.0 * w) + fall * brake;
     let triangular = w <= brake && if flat { k <= limit } else { low >= side || k >= limit };
     if triangular {
-        quartic(w, k).clamp(low, high)
+        between(low, quartic(w, k), high)
     } else if flat {
         let q = sqrt(fall * (2.0 * k - w * fall)) - w;
-        descend(w, half_root(fall, q).min(high), low.max(0.0), k, fall)
+        descend(w, lesser(half_root(fall, q), high), greater(low, 0.0), k, bounds)
     } else {
-        bracket(w, low, if w <= brake { side } else { 0.0 }, k, fall)
+        bracket(w, low, if w <= brake { side } else { 0.0 }, k, bounds)
     }
+}
+
+#[inline(always)]
+fn between(low: f64, x: f64, high: f64) -> f64 {
+    greater(low, lesser(high, x))
 }
 
 /// Positive root of α(α + `b`) = `q`.
@@ -152,7 +154,7 @@ fn half_root(b: f64, q: f64) -> f64 {
 /// w > 0; it is at most the start.
 #[inline]
 fn quartic(w: f64, k: f64) -> f64 {
-    let mut s = cbrt(4.0 * k).max(sqrt(w) / 2.0);
+    let mut s = greater(cbrt(4.0 * k), sqrt(w) / 2.0);
     for _ in 0..50 {
         let square = s * s;
         let value = ((square + 4.0 * w) * s - 4.0 * k) * s - w * w;
@@ -170,26 +172,27 @@ fn quartic(w: f64, k: f64) -> f64 {
 }
 
 #[inline]
-fn value_and_slope(w: f64, alpha: f64, fall: f64) -> (f64, f64) {
+fn value_and_slope(w: f64, alpha: f64, bounds: &Bounds) -> (f64, f64) {
     let square = alpha * alpha;
-    let u = (w + square).max(0.0);
-    let (way, slope) = if u <= fall * fall {
+    let u = greater(0.0, w + square);
+    let (way, slope) = if u <= bounds.fall * bounds.fall {
         let root = sqrt(u);
         (u * root, 1.5 * root)
     } else {
-        (u * (u / fall + fall) / 2.0, u / fall + fall / 2.0)
+        let held = u * bounds.per_fall;
+        (0.5 * u * (held + bounds.fall), held + 0.5 * bounds.fall)
     };
     (alpha * (square + 2.0 * w) + way, 3.0 * square + 2.0 * w + 2.0 * alpha * slope)
 }
 
 /// Newton where F is convex: from above straight down to the root.
 #[inline]
-fn descend(w: f64, start: f64, low: f64, k: f64, fall: f64) -> f64 {
+fn descend(w: f64, start: f64, low: f64, k: f64, bounds: &Bounds) -> f64 {
     let mut alpha = start;
     for _ in 0..50 {
-        let (value, slope) = value_and_slope(w, alpha, fall);
+        let (value, slope) = value_and_slope(w, alpha, bounds);
         let step = (value - k) / slope;
-        alpha = (alpha - step).max(low);
+        alpha = greater(low, alpha - step);
         if step.abs() <= 1e-8 * alpha {
             break;
         }
@@ -198,10 +201,10 @@ fn descend(w: f64, start: f64, low: f64, k: f64, fall: f64) -> f64 {
 }
 
 /// Newton between two ends, halving where it leads out of them: F has no slope at −D.
-fn bracket(w: f64, mut low: f64, mut high: f64, k: f64, fall: f64) -> f64 {
+fn bracket(w: f64, mut low: f64, mut high: f64, k: f64, bounds: &Bounds) -> f64 {
     let mut alpha = (low + high) / 2.0;
     for _ in 0..200 {
-        let (value, slope) = value_and_slope(w, alpha, fall);
+        let (value, slope) = value_and_slope(w, alpha, bounds);
         if value < k {
             low = alpha;
         } else {
