@@ -65,7 +65,7 @@ impl<S: Storage + ?Sized> Storage for &mut S {
     }
 }
 
-#[cfg(feature = "alloc")]
+#[cfg(any(test, feature = "alloc"))]
 impl Storage for alloc::vec::Vec<u8> {
     fn read(&self, offset: usize, out: &mut [u8]) -> Result<(), StorageError> {
         self.as_slice().read(offset, out)
