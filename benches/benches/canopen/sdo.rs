@@ -1,15 +1,9 @@
-//! SDO and PDO against canopen-rs 0.6, whose loops here are its codec alone: encode, decode, store. Ours
-//! are the whole engines: frame dispatch by identifier, transfer state, time-outs, checks, outcome, and on
-//! the server's side the object dictionary.
-//!
-//! `cargo bench -p benches --bench canopen` runs it all and ends with status 1 when a ratio is below its
-//! bar; `-- --smoke` runs every measurement a few times and judges nothing.
+//! SDO: expedited, in segments, in blocks.
 
 use core::hint::black_box;
 use core::time::Duration;
-use std::process::ExitCode;
 
-use benches::{Contender, paired};
+use benches::Contender;
 use canopen_master::data_type::DataType as Type;
 use canopen_master::od::{Dictionary, Entry, Table};
 use canopen_master::sdo::{
@@ -17,11 +11,10 @@ use canopen_master::sdo::{
     read_slice,
 };
 use canopen_master::{Address, Frame};
-use canopen_rs::pdo::{MappingEntry, PdoMapping};
 use canopen_rs::sdo::{self as theirs, block};
-use canopen_rs::{Address as TheirAddress, DataType, Entry as TheirEntry, ObjectDictionary, Value};
-use pdo::mapping::Entry as Mapped;
-use pdo::{CobId, Mapping, Rpdo, RpdoConfig, RpdoEvent, Transmission};
+use canopen_rs::{Address as TheirAddress, DataType, Value};
+
+use super::Judge;
 
 const KIB64: usize = 64 * 1024;
 /// The last segment is a whole one before it is cut.
@@ -66,6 +59,7 @@ impl Access for Domain {
 
 const ROUND_TRIPS: u32 = 1000;
 
+#[inline(never)]
 fn our_expedited(client: &mut Client<Small>, server: &mut Server, objects: &mut impl Access) -> u32 {
     let options = Options::new(Duration::from_millis(100));
     let mut sum = 0u32;
@@ -83,6 +77,7 @@ fn our_expedited(client: &mut Client<Small>, server: &mut Server, objects: &mut 
     sum
 }
 
+#[inline(never)]
 fn their_expedited() -> u32 {
     let at = TheirAddress::new(0x2000, 0);
     let mut sum = 0u32;
@@ -100,6 +95,7 @@ fn their_expedited() -> u32 {
     sum
 }
 
+#[inline(never)]
 fn our_upload<'a>(
     client: &mut Client<&'a mut [u8]>,
     server: &mut Server,
@@ -128,6 +124,7 @@ fn our_upload<'a>(
 }
 
 /// Request, answer and data of every segment, by their codec.
+#[inline(never)]
 fn their_segments(data: &[u8], to: &mut [u8]) -> usize {
     let (mut toggle, mut at) = (false, 0);
     for piece in data.chunks(7) {
@@ -144,6 +141,7 @@ fn their_segments(data: &[u8], to: &mut [u8]) -> usize {
     at
 }
 
+#[inline(never)]
 fn their_blocks(data: &[u8], receiver: &mut block::BlockReceiver<ROOM>) -> usize {
     *receiver = block::BlockReceiver::new();
     let mut writer = block::BlockWriter::new(data, 127);
@@ -162,60 +160,7 @@ fn their_blocks(data: &[u8], receiver: &mut block::BlockReceiver<ROOM>) -> usize
     receiver.finish(unused, crc, true).expect("right").len()
 }
 
-const PDOS: u64 = 1000;
-
-fn our_pdos(rpdo: &mut Rpdo, mapping: &Mapping<4>, frame: &Frame) -> u64 {
-    let mut sum = 0u64;
-    for i in 0..PDOS {
-        rpdo.handle_frame(Duration::from_micros(i), black_box(frame));
-        let Some(RpdoEvent::Data(payload)) = rpdo.poll_event() else { panic!("no data") };
-        let mut values = [0u16; 4];
-        let mapped = mapping.unpack(payload).expect("8 bytes");
-        values.iter_mut().zip(mapped).for_each(|(value, (_, bits))| *value = bits.unsigned() as u16);
-        sum = black_box(values).iter().fold(sum, |sum, &value| sum.wrapping_add(u64::from(value)));
-    }
-    sum
-}
-
-fn their_pdos(mapping: &PdoMapping<4>, od: &mut ObjectDictionary<16>, data: &[u8; 8]) -> u64 {
-    for _ in 0..PDOS {
-        canopen_rs::pdo::unpack(mapping, od, black_box(data)).expect("8 bytes");
-        black_box(&mut *od);
-    }
-    let values = (1..=4).map(|sub| match od.read(TheirAddress::new(0x6401, sub)) {
-        Ok(Value::Unsigned16(value)) => u64::from(value),
-        other => panic!("{other:?}"),
-    });
-    values.sum::<u64>().wrapping_mul(PDOS)
-}
-
-/// Contender 0 is ours, 1 is canopen-rs.
-fn compare(
-    what: &str,
-    bar: f64,
-    work: f64,
-    unit: &str,
-    rounds: usize,
-    contenders: &mut [Contender<'_>],
-) -> bool {
-    let times = paired(contenders, rounds);
-    let rate = |which: usize| work / times.median(which).as_secs_f64() / 1e6;
-    let ratio = times.ratio(1, 0);
-    let below = ratio < bar;
-    let verdict = if below { "  BELOW THE BAR" } else { "" };
-    println!(
-        "{what:34} {:8.1} {unit}  canopen-rs {:8.1} {unit}  {ratio:5.2} x  bar {bar:.2}{verdict}",
-        rate(0),
-        rate(1)
-    );
-    below
-}
-
-fn main() -> ExitCode {
-    let smoke = std::env::args().any(|arg| arg == "--smoke");
-    let rounds = if smoke { 3 } else { 201 };
-    let mut below = 0;
-
+pub(super) fn run(judge: &mut Judge) {
     let mut memory = [0; TABLE.memory()];
     let mut dictionary = Dictionary::new(TABLE.view(), &mut memory, ()).expect("enough memory");
     let (mut client, mut server) = (Client::new(CHANNEL), Server::new(CHANNEL, NEXT_REQUEST));
@@ -224,8 +169,8 @@ fn main() -> ExitCode {
         Contender::new("ours", || _ = black_box(our_expedited(&mut client, &mut server, &mut dictionary))),
         Contender::new("canopen-rs", || _ = black_box(their_expedited())),
     ];
-    let trips = f64::from(ROUND_TRIPS);
-    below += u32::from(compare("expedited round trips", 0.75, trips, "M/s ", rounds * 5, &mut contenders));
+    let times = judge.measure(1005, &mut contenders);
+    judge.faster("expedited round trips", 0.75, (ROUND_TRIPS.into(), "M/s "), &times);
 
     let data: Vec<u8> = (0..KIB64).map(|i| (i * 7 + i / 256) as u8).collect();
     let mut their_buffer = vec![0; KIB64];
@@ -256,40 +201,9 @@ fn main() -> ExitCode {
                 });
             }),
         ];
-        below += u32::from(compare(what, bar, KIB64 as f64, "MB/s", rounds, &mut contenders));
+        let times = judge.measure(201, &mut contenders);
+        judge.faster(what, bar, (KIB64 as f64, "MB/s"), &times);
         drop(contenders);
         assert_eq!(to, data);
     }
-
-    let entries = [1, 2, 3, 4].map(|sub| Mapped::new(0x6401, sub, 16));
-    let mapping: Mapping<4> = Mapping::new(&entries).expect("64 bits");
-    let config = RpdoConfig {
-        cob_id: CobId(0x285),
-        transmission: Transmission::EventProfile,
-        timeout: Duration::from_millis(100),
-        bytes: mapping.bytes(),
-    };
-    let mut rpdo = Rpdo::new(config);
-    let bytes = [1, 2, 3, 4, 5, 6, 7, 8];
-    let frame = Frame::standard(0x285, bytes);
-    let mut od = ObjectDictionary::<16>::new();
-    let mut their_mapping = PdoMapping::<4>::default();
-    for sub in 1..=4 {
-        let at = TheirAddress::new(0x6401, sub);
-        od.insert(at, TheirEntry::rw(Value::Unsigned16(0))).expect("room");
-        their_mapping.push(MappingEntry { address: at, bit_length: 16 }).expect("room");
-    }
-    assert_eq!(our_pdos(&mut rpdo, &mapping, &frame), their_pdos(&their_mapping, &mut od, &bytes));
-    let mut contenders = [
-        Contender::new("ours", || _ = black_box(our_pdos(&mut rpdo, &mapping, &frame))),
-        Contender::new("canopen-rs", || _ = black_box(their_pdos(&their_mapping, &mut od, &bytes))),
-    ];
-    let what = "8-byte PDO to four 16-bit values";
-    below += u32::from(compare(what, 8.0, PDOS as f64, "M/s ", rounds * 5, &mut contenders));
-
-    if below > 0 && !smoke {
-        println!("{below} ratios are below their bars");
-        return ExitCode::FAILURE;
-    }
-    ExitCode::SUCCESS
 }
