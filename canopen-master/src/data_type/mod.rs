@@ -112,14 +112,30 @@ impl DataType {
     #[cfg_attr(target_pointer_width = "32", inline(never))]
     #[cfg_attr(not(target_pointer_width = "32"), inline)]
     pub const fn size(self) -> Option<u8> {
-        match self.kind() {
-            Kind::Boolean => Some(1),
-            Kind::Signed(bytes) | Kind::Unsigned(bytes) | Kind::Real(bytes) => Some(bytes),
-            Kind::TimeOfDay | Kind::TimeDifference => Some(6),
+        match SIZES.split_at_checked(self.0 as usize) {
+            Some((_, [size, ..])) if *size > 0 => Some(*size),
             _ => None,
         }
     }
 }
+
+/// Bytes of the types by code; 0 where it depends on the value.
+const SIZES: [u8; 28] = {
+    let mut sizes = [0; 28];
+    let mut rest: &[DataType] = DataType::ALL;
+    while let [data_type, tail @ ..] = rest {
+        if let Some((_, [size, ..])) = sizes.split_at_mut_checked(data_type.0 as usize) {
+            *size = match data_type.kind() {
+                Kind::Boolean => 1,
+                Kind::Signed(bytes) | Kind::Unsigned(bytes) | Kind::Real(bytes) => bytes,
+                Kind::TimeOfDay | Kind::TimeDifference => 6,
+                _ => 0,
+            };
+        }
+        rest = tail;
+    }
+    sizes
+};
 
 impl fmt::Display for DataType {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -78,7 +78,8 @@ impl<'a, H: Hooks> Dictionary<'a, H> {
     /// The value of an entry in memory or of a constant string; `None` of any other.
     #[must_use]
     pub fn bytes(&self, at: Address) -> Option<&[u8]> {
-        slot(&self.table, self.table.find(at).ok()?, self.memory)
+        let place = self.table.find(at).ok()?;
+        slot(&self.table, place, self.table.entries.get(place)?, self.memory)
     }
 
     /// A scalar, for the application: rights do not matter.
@@ -118,9 +119,6 @@ impl<'a, H: Hooks> Dictionary<'a, H> {
     }
 
     fn place(&self, at: Address) -> Result<usize, AbortCode> {
-        if self.table.entries.get(self.last).is_some_and(|entry| entry.at == at) {
-            return Ok(self.last);
-        }
         self.table
             .find(at)
             .map_err(|others| if others { AbortCode::NO_SUB_INDEX } else { AbortCode::NO_OBJECT })
@@ -129,21 +127,33 @@ impl<'a, H: Hooks> Dictionary<'a, H> {
     #[cfg_attr(target_pointer_width = "32", inline(never))]
     #[cfg_attr(not(target_pointer_width = "32"), inline)]
     fn find(&mut self, at: Address) -> Result<(usize, &'a Entry<'a>), AbortCode> {
-        let place = self.place(at)?;
-        self.last = place;
-        self.table.entries.get(place).map(|entry| (place, entry)).ok_or(AbortCode::NO_OBJECT)
+        if let Some(entry) = self.table.entries.get(self.last)
+            && entry.at == at
+        {
+            return Ok((self.last, entry));
+        }
+        self.last = self.place(at)?;
+        self.table.entries.get(self.last).map(|entry| (self.last, entry)).ok_or(AbortCode::NO_OBJECT)
     }
 
     /// A scalar in memory or a constant one.
     fn scalar(&self, place: usize) -> Option<Small> {
         let entry = self.table.entries.get(place)?;
-        let size = usize::from(entry.data_type.size()?);
-        match (entry.place, entry.initial) {
-            (Place::Constant, Initial::Number(value)) => Small::new(value.to_le_bytes().get(..size)?),
-            (Place::Memory { .. }, _) => Small::new(slot(&self.table, place, self.memory)?),
-            (Place::Store | Place::Restore, _) => Some(Small::from(ON_COMMAND)),
-            _ => None,
-        }
+        entry.data_type.size()?;
+        Small::new(self.value(place, entry, &mut [0; 8])?)
+    }
+
+    /// The value of an entry that is not the application's; a number that lies nowhere in `own`.
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    #[cfg_attr(not(target_pointer_width = "32"), inline)]
+    fn value<'s>(&'s self, place: usize, entry: &Entry<'s>, own: &'s mut [u8; 8]) -> Option<&'s [u8]> {
+        let number = match (entry.place, entry.initial) {
+            (Place::Constant, Initial::Number(value)) => value,
+            (Place::Store | Place::Restore, _) => ON_COMMAND.into(),
+            _ => return slot(&self.table, place, entry, self.memory),
+        };
+        *own = number.to_le_bytes();
+        own.get(..usize::from(entry.data_type.size()?))
     }
 
     /// A process value as bits, for a PDO.
@@ -219,11 +229,9 @@ impl<H: Hooks> Access for Dictionary<'_, H> {
         if entry.place == Place::Application {
             return self.hooks.read(at, offset, out);
         }
-        if let Some(value) = self.scalar(place) {
-            return Ok(read_slice(value.as_slice(), offset, out));
-        }
-        let bytes = slot(&self.table, place, self.memory).ok_or(AbortCode::NO_DATA)?;
-        Ok(read_slice(bytes, offset, out))
+        let mut own = [0; 8];
+        let value = self.value(place, entry, &mut own).ok_or(AbortCode::NO_DATA)?;
+        Ok(read_slice(value, offset, out))
     }
 
     fn begin_write(&mut self, at: Address, size: Option<u32>) -> Result<(), AbortCode> {
@@ -290,15 +298,22 @@ fn room<'m>(table: &View<'_>, place: usize, memory: &'m mut [u8]) -> Option<&'m 
 }
 
 /// The value of an entry in memory, or a constant string.
-pub(super) fn slot<'m>(table: &View<'m>, place: usize, memory: &'m [u8]) -> Option<&'m [u8]> {
-    let entry = table.entries.get(place)?;
-    if let (Place::Constant, Initial::Bytes(bytes)) = (entry.place, entry.initial) {
-        return Some(bytes);
+#[cfg_attr(target_pointer_width = "32", inline(never))]
+#[cfg_attr(not(target_pointer_width = "32"), inline)]
+pub(super) fn slot<'m>(
+    table: &View<'m>,
+    place: usize,
+    entry: &Entry<'m>,
+    memory: &'m [u8],
+) -> Option<&'m [u8]> {
+    match (entry.place, entry.initial) {
+        (Place::Constant, Initial::Bytes(bytes)) => return Some(bytes),
+        (Place::Memory { .. }, _) => {}
+        _ => return None,
     }
-    let offset = usize::from(*table.offsets.get(place)?);
-    let room = memory.get(offset..offset + usize::from(entry.memory())).filter(|room| !room.is_empty())?;
-    if entry.data_type.size().is_some() {
-        return Some(room);
+    let room = memory.get(usize::from(*table.offsets.get(place)?)..)?;
+    if let Some(size) = entry.data_type.size() {
+        return room.get(..usize::from(size));
     }
     let (length, bytes) = room.split_first_chunk()?;
     bytes.get(..usize::from(u16::from_le_bytes(*length)))

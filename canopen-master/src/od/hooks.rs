@@ -109,7 +109,7 @@ impl<'a> Iterator for Stored<'a> {
                 _ => true,
             };
             if wanted && entry.stored {
-                return Some((entry.at, slot(&self.table, place, self.memory)?));
+                return Some((entry.at, slot(&self.table, place, entry, self.memory)?));
             }
         }
     }

@@ -192,7 +192,8 @@ impl Buffer for alloc::vec::Vec<u8> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct Small {
     data: [u8; 8],
-    len: u8,
+    /// Wide, so that it is read as it was written.
+    len: u32,
 }
 
 impl Small {
@@ -203,14 +204,14 @@ impl Small {
     #[must_use]
     #[inline]
     pub fn new(bytes: &[u8]) -> Option<Self> {
-        (bytes.len() <= 8).then(|| Self { data: load(bytes).to_le_bytes(), len: bytes.len() as u8 })
+        (bytes.len() <= 8).then(|| Self { data: load(bytes).to_le_bytes(), len: bytes.len() as u32 })
     }
 
     /// The bytes.
     #[must_use]
     #[inline]
     pub fn as_slice(&self) -> &[u8] {
-        self.data.get(..usize::from(self.len)).unwrap_or(&[])
+        self.data.get(..self.len as usize).unwrap_or(&[])
     }
 }
 
@@ -228,13 +229,13 @@ impl Buffer for Small {
             return Ok(());
         }
         copy_to(&mut self.data, offset, data)?;
-        self.len = (offset as usize + data.len()) as u8;
+        self.len = offset + data.len() as u32;
         Ok(())
     }
 
     #[inline]
     fn size(&self) -> Option<u32> {
-        Some(u32::from(self.len))
+        Some(self.len)
     }
 
     #[inline]

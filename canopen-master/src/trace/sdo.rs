@@ -410,8 +410,9 @@ fn step_request(open: &mut Open, request: &Request) -> Step {
     match (*request, open.phase) {
         (Request::InitiateDownload { content, .. }, _) => {
             match content {
-                message::Content::Expedited(bytes) => open.push(message::first(&bytes.padded(), bytes.len())),
-                message::Content::ExpeditedUnsized(bytes) => open.push(&bytes),
+                message::Content::Expedited { data, .. } => {
+                    open.push(message::first(&data.padded(), data.len()));
+                }
                 message::Content::Segmented(_) => {}
             }
             Step::Goes
@@ -464,8 +465,9 @@ fn step_response(open: &mut Open, response: &Response) -> Step {
             // The answer to a block upload may be a plain one.
             open.transfer.mode = self::mode(&content);
             match content {
-                message::Content::Expedited(bytes) => open.push(message::first(&bytes.padded(), bytes.len())),
-                message::Content::ExpeditedUnsized(bytes) => open.push(&bytes),
+                message::Content::Expedited { data, .. } => {
+                    open.push(message::first(&data.padded(), data.len()));
+                }
                 message::Content::Segmented(_) => {
                     open.phase = Phase::Segments { toggle: false, asked: false, last: false };
                     return Step::Goes;

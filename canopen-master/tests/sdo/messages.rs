@@ -6,8 +6,9 @@ use proptest::prelude::*;
 
 fn content() -> impl Strategy<Value = Content> {
     prop_oneof![
-        prop::collection::vec(any::<u8>(), 1..=4).prop_map(|b| Content::Expedited(Bytes::new(&b).unwrap())),
-        any::<[u8; 4]>().prop_map(Content::ExpeditedUnsized),
+        prop::collection::vec(any::<u8>(), 1..=4)
+            .prop_map(|b| Content::Expedited { data: Bytes::new(&b).unwrap(), sized: true }),
+        any::<[u8; 4]>().prop_map(|b| Content::Expedited { data: Bytes::new(&b).unwrap(), sized: false }),
         any::<Option<u32>>().prop_map(Content::Segmented),
     ]
 }

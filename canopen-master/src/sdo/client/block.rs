@@ -8,7 +8,7 @@ use super::super::block::{Confirmed, MAX_BLOCK_SIZE, Receiver, STALLS, Sender, i
 use super::super::message::{ABORT, BlockSegment, Content, Request, Response, SEGMENT};
 use super::super::{Address, Buffer};
 use super::segmented::next_piece;
-use super::{Client, Fault, Outcome, State};
+use super::{Client, Fault, State};
 use crate::clock::after;
 
 /// How a block transfer is carried out.
@@ -91,7 +91,7 @@ impl<B: Buffer> Client<B> {
 
     /// Whether a silence was answered by asking for what was lost.
     pub(super) fn ask_again(&mut self) -> bool {
-        let again = self.state == State::BlockReceive && self.receiver.is_cut_short();
+        let again = matches!(self.state, State::BlockReceive) && self.receiver.is_cut_short();
         if again {
             self.confirm_block();
         }
@@ -126,7 +126,7 @@ impl<B: Buffer> Client<B> {
             return self.give_up(Fault::Crc { computed, found });
         }
         self.finish_upload();
-        if matches!(self.state, State::Ended(Outcome::Done(_))) {
+        if matches!(self.state, State::Done) {
             self.parting = Some(Request::EndBlockUpload.encode());
         }
     }

@@ -47,7 +47,7 @@ impl Default for Options {
     }
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy)]
 enum State {
     Idle,
     /// The request to begin was given; its answer is awaited.
@@ -84,8 +84,10 @@ enum State {
     BlockConfirm,
     /// The end is to be confirmed.
     BlockDownloadEnd,
-    /// The outcome waits to be polled.
-    Ended(Outcome),
+    /// All data were transferred; the outcome waits to be polled.
+    Done,
+    /// It ended otherwise.
+    Failed,
 }
 
 /// The answer to a request that was given up, which may still come.
@@ -116,6 +118,8 @@ struct Outstanding {
 pub struct Client<B> {
     channel: Channel,
     state: State,
+    /// Of a transfer that has failed.
+    failure: Outcome,
     buffer: Option<B>,
     at: Address,
     timeout: Duration,
@@ -145,6 +149,7 @@ impl<B: Buffer> Client<B> {
         Self {
             channel,
             state: State::Idle,
+            failure: Outcome::Cancelled,
             buffer: None,
             at: Address::new(0, 0),
             timeout: ANSWER,
@@ -246,13 +251,13 @@ impl<B: Buffer> Client<B> {
 
     /// Gives a transfer up; its outcome becomes [`Outcome::Cancelled`] unless it has one already.
     pub fn cancel(&mut self, ticket: Ticket) {
-        if ticket != Ticket(self.ticket) || matches!(self.state, State::Idle | State::Ended(_)) {
+        if ticket != Ticket(self.ticket) || matches!(self.state, State::Idle | State::Done | State::Failed) {
             return;
         }
         // Before the first frame has left, the server knows of nothing.
         let begun = self.tx.is_none() || !self.is_beginning();
         self.expect_late(self.deadline);
-        self.finish(Outcome::Cancelled);
+        self.fail(Outcome::Cancelled);
         if begun {
             self.send_abort(AbortCode::TIMED_OUT);
         }
@@ -276,7 +281,7 @@ impl<B: Buffer> Client<B> {
             return;
         }
         self.expect_late(Some(after(deadline, self.timeout)));
-        self.finish(Outcome::TimedOut);
+        self.fail(Outcome::TimedOut);
         self.send_abort(AbortCode::TIMED_OUT);
     }
 
@@ -297,7 +302,7 @@ impl<B: Buffer> Client<B> {
             return self.parting_frame();
         }
         let Some(tx) = self.tx else {
-            if self.state == State::BlockSend {
+            if matches!(self.state, State::BlockSend) {
                 return self.next_block_segment(now).or_else(|| self.parting_frame());
             }
             return None;
@@ -318,8 +323,8 @@ impl<B: Buffer> Client<B> {
     #[inline]
     pub fn poll_event(&mut self) -> Option<Finished<B>> {
         let outcome = match self.state {
-            State::Ended(Outcome::Done(bytes)) => Outcome::Done(bytes),
-            State::Ended(outcome) => outcome,
+            State::Done => Outcome::Done(self.offset),
+            State::Failed => self.failure,
             _ => return None,
         };
         self.state = State::Idle;
@@ -331,10 +336,10 @@ impl<B: Buffer> Client<B> {
     fn handle_data(&mut self, now: Duration, data: &[u8]) {
         // With our next request still to be sent, nothing but an abort of what was begun makes sense.
         let asked = self.tx.is_none() || (!self.is_beginning() && data.first() == Some(&ABORT));
-        if !asked || matches!(self.state, State::Idle | State::Ended(_)) {
+        if !asked || matches!(self.state, State::Idle | State::Done | State::Failed) {
             return self.stray(data);
         }
-        if self.state == State::BlockReceive {
+        if matches!(self.state, State::BlockReceive) {
             return self.on_block_frame(now, data);
         }
         let response = match Response::parse(data) {
@@ -380,7 +385,7 @@ impl<B: Buffer> Client<B> {
             (Response::AckBlockDownload { sequence, block_size }, State::BlockSend | State::BlockConfirm) => {
                 self.on_block_confirmed(sequence, block_size);
             }
-            (Response::EndBlockDownload, State::BlockDownloadEnd) => self.finish(Outcome::Done(self.offset)),
+            (Response::EndBlockDownload, State::BlockDownloadEnd) => self.done(),
             _ if self.is_beginning() => self.stray(data),
             _ => self.give_up(Fault::Unexpected { command: data.first().copied().unwrap_or(0) }),
         }
@@ -391,7 +396,7 @@ impl<B: Buffer> Client<B> {
     fn on_abort(&mut self, at: Address, code: AbortCode, data: &[u8]) {
         let unnamed = at == Address::new(0, 0) && !self.is_beginning();
         if at == self.at || unnamed {
-            self.finish(Outcome::Aborted(code));
+            self.fail(Outcome::Aborted(code));
         } else {
             self.stray(data);
         }
@@ -453,10 +458,17 @@ impl<B: Buffer> Client<B> {
     }
 
     #[inline]
-    fn finish(&mut self, outcome: Outcome) {
+    fn done(&mut self) {
         self.tx = None;
         self.deadline = None;
-        self.state = State::Ended(outcome);
+        self.state = State::Done;
+    }
+
+    #[cold]
+    fn fail(&mut self, outcome: Outcome) {
+        self.done();
+        self.state = State::Failed;
+        self.failure = outcome;
     }
 
     fn send_abort(&mut self, code: AbortCode) {
@@ -465,7 +477,7 @@ impl<B: Buffer> Client<B> {
 
     #[cold]
     fn give_up(&mut self, fault: Fault) {
-        self.finish(Outcome::GaveUp(fault));
+        self.fail(Outcome::GaveUp(fault));
         self.send_abort(fault.abort_code());
     }
 }

@@ -38,7 +38,11 @@ impl<B> fmt::Debug for Refused<B> {
 }
 
 /// The end of a transfer.
+// In this order no padding lies before the buffer: copied together with it, the buffer would be read
+// across the borders of what was just written, for which a processor waits longer than a whole transfer
+// takes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(C)]
 pub struct Finished<B> {
     /// Of the command.
     pub ticket: Ticket,

@@ -2,7 +2,7 @@
 
 use super::super::message::{Bytes, Content, Request, SEGMENT, first, segment};
 use super::super::{AbortCode, Address, Buffer};
-use super::{Client, Fault, Outcome, State};
+use super::{Client, Fault, State};
 
 /// The first frame of a download and how many bytes went with it.
 #[inline]
@@ -18,11 +18,12 @@ pub(super) fn begin_download(
             if buffer.read(0, out)? != out.len() {
                 return Err(AbortCode::NO_DATA);
             }
-            Bytes::new(out).map_or(Content::Segmented(Some(size)), Content::Expedited)
+            let data = Bytes::new(out).unwrap_or(Bytes::EMPTY);
+            Content::Expedited { data, sized: true }
         }
         size => Content::Segmented(size),
     };
-    let sent = if let Content::Expedited(bytes) = content { bytes.len() as u8 } else { 0 };
+    let sent = if let Content::Expedited { data, .. } = content { data.len() as u8 } else { 0 };
     Ok((Request::InitiateDownload { at, content }.encode(), sent))
 }
 
@@ -55,8 +56,7 @@ impl<B: Buffer> Client<B> {
     #[inline]
     pub(super) fn on_upload_begun(&mut self, content: Content) {
         match content {
-            Content::Expedited(bytes) => self.take_all(first(&bytes.padded(), bytes.len())),
-            Content::ExpeditedUnsized(bytes) => self.take_all(&bytes),
+            Content::Expedited { data, .. } => self.take_all(first(&data.padded(), data.len())),
             Content::Segmented(size) => {
                 self.size = size;
                 if self.with_buffer(|buffer| buffer.begin(size)).is_none() {
@@ -74,7 +74,7 @@ impl<B: Buffer> Client<B> {
         if self.with_buffer(|buffer| buffer.begin(Some(size)).and_then(|()| buffer.write(0, bytes))).is_some()
         {
             self.offset = size;
-            self.finish(Outcome::Done(size));
+            self.done();
         }
     }
 
@@ -123,7 +123,7 @@ impl<B: Buffer> Client<B> {
         let found = self.offset;
         match self.size {
             Some(indicated) if indicated != found => self.give_up(Fault::Size { indicated, found }),
-            _ => self.finish(Outcome::Done(found)),
+            _ => self.done(),
         }
     }
 
@@ -131,7 +131,7 @@ impl<B: Buffer> Client<B> {
     pub(super) fn on_download_begun(&mut self, sent: u8) {
         if sent > 0 {
             self.offset = u32::from(sent);
-            return self.finish(Outcome::Done(self.offset));
+            return self.done();
         }
         self.send_segment(false);
     }
@@ -143,7 +143,7 @@ impl<B: Buffer> Client<B> {
         }
         self.offset = self.offset.saturating_add(u32::from(sent));
         if last {
-            return self.finish(Outcome::Done(self.offset));
+            return self.done();
         }
         self.send_segment(!toggle);
     }

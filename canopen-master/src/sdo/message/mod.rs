@@ -27,10 +27,13 @@ pub(crate) const ABORT: u8 = 0x80;
 /// What an initiate frame of a download or an initiate answer of an upload carries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Content {
-    /// All of it, 1…4 bytes, their number indicated.
-    Expedited(Bytes<4>),
-    /// All of it in 4 bytes, of which the object's type says how many count.
-    ExpeditedUnsized([u8; 4]),
+    /// All of it.
+    Expedited {
+        /// 1…4 bytes.
+        data: Bytes<4>,
+        /// Their number is indicated; if not, all 4 are sent, and the object's type says how many count.
+        sized: bool,
+    },
     /// Segments follow; in all so many bytes, if indicated.
     Segmented(Option<u32>),
 }
@@ -79,9 +82,9 @@ pub enum MessageError {
         /// First byte.
         command: u8,
         /// Bytes there must be.
-        expected: usize,
+        expected: u8,
         /// Bytes there are.
-        found: usize,
+        found: u8,
     },
 }
 
@@ -114,7 +117,10 @@ mod tests {
         );
         assert_eq!(
             Response::parse(&[0x5F, 0x41, 0x60, 0x02, 7, 0xAD, 0xBE, 0xEF]),
-            Ok(Response::InitiateUpload { at: AT, content: Content::Expedited(short(&[7])) })
+            Ok(Response::InitiateUpload {
+                at: AT,
+                content: Content::Expedited { data: short(&[7]), sized: true }
+            })
         );
         assert_eq!(
             Response::parse(&[0x0D, 7, 0xAD, 0xBE, 0xEF, 1, 2, 3]),
@@ -127,7 +133,10 @@ mod tests {
         assert_eq!(Request::parse(&[0x40, 0x41, 0x60, 0x02]), Ok(Request::InitiateUpload { at: AT }));
         assert_eq!(
             Response::parse(&[0x4B, 0x41, 0x60, 0x02, 0x40, 0x00]),
-            Ok(Response::InitiateUpload { at: AT, content: Content::Expedited(short(&[0x40, 0])) })
+            Ok(Response::InitiateUpload {
+                at: AT,
+                content: Content::Expedited { data: short(&[0x40, 0]), sized: true }
+            })
         );
         assert_eq!(
             Response::parse(&[0x4B, 0x41, 0x60, 0x02, 0x40]),

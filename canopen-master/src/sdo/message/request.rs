@@ -174,7 +174,7 @@ mod tests {
     /// CiA 301, 7.2.4.3: command bytes and positions.
     #[test]
     fn golden_requests() {
-        let expedited = |bytes| Content::Expedited(short(bytes));
+        let expedited = |bytes| Content::Expedited { data: short(bytes), sized: true };
         for (request, bytes) in [
             (Request::InitiateUpload { at: AT }, [0x40, 0x41, 0x60, 0x02, 0, 0, 0, 0]),
             (
@@ -186,7 +186,10 @@ mod tests {
                 [0x2F, 0x41, 0x60, 0x02, 1, 0, 0, 0],
             ),
             (
-                Request::InitiateDownload { at: AT, content: Content::ExpeditedUnsized([1, 2, 3, 4]) },
+                Request::InitiateDownload {
+                    at: AT,
+                    content: Content::Expedited { data: short(&[1, 2, 3, 4]), sized: false },
+                },
                 [0x22, 0x41, 0x60, 0x02, 1, 2, 3, 4],
             ),
             (

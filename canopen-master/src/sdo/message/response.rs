@@ -171,7 +171,10 @@ mod tests {
     fn golden_responses() {
         for (response, bytes) in [
             (
-                Response::InitiateUpload { at: AT, content: Content::Expedited(short(&[0x40, 0])) },
+                Response::InitiateUpload {
+                    at: AT,
+                    content: Content::Expedited { data: short(&[0x40, 0]), sized: true },
+                },
                 [0x4B, 0x41, 0x60, 0x02, 0x40, 0, 0, 0],
             ),
             (

@@ -20,7 +20,7 @@ pub(super) mod bit {
 #[derive(Clone, Copy)]
 pub(super) struct Raw {
     word: u64,
-    len: usize,
+    len: u8,
 }
 
 impl Raw {
@@ -30,7 +30,7 @@ impl Raw {
             return Self { word: u64::from_le_bytes(bytes), len: 8 };
         }
         let data = data.get(..8).unwrap_or(data);
-        Self { word: load(data), len: data.len() }
+        Self { word: load(data), len: data.len() as u8 }
     }
 
     #[inline]
@@ -44,7 +44,7 @@ impl Raw {
     }
 
     #[inline]
-    pub(super) const fn need(&self, expected: usize) -> Result<(), MessageError> {
+    pub(super) const fn need(&self, expected: u8) -> Result<(), MessageError> {
         if self.len < expected {
             return Err(MessageError::Short { command: self.command(), expected, found: self.len });
         }
@@ -66,30 +66,24 @@ impl Raw {
     #[inline]
     pub(super) fn content(&self) -> Result<Content, MessageError> {
         let command = self.command();
-        let (expedited, sized) = (command & bit::EXPEDITED != 0, command & bit::SIZED != 0);
-        Ok(match (expedited, sized) {
-            (true, true) => {
-                let len = 4 - usize::from(command >> 2 & 3);
-                self.need(4 + len)?;
-                Content::Expedited(Bytes::of_word(self.word >> 32, len))
-            }
-            (true, false) => {
-                self.need(5)?;
-                Content::ExpeditedUnsized(self.tail().to_le_bytes())
-            }
-            (false, true) => {
-                self.need(8)?;
-                Content::Segmented(Some(self.tail()))
-            }
-            (false, false) => Content::Segmented(None),
-        })
+        let sized = command & bit::SIZED != 0;
+        if command & bit::EXPEDITED != 0 {
+            let len = if sized { 4 - (command >> 2 & 3) } else { 4 };
+            self.need(if sized { 4 + len } else { 5 })?;
+            return Ok(Content::Expedited { data: Bytes::of_word(self.word >> 32, len.into()), sized });
+        }
+        if !sized {
+            return Ok(Content::Segmented(None));
+        }
+        self.need(8)?;
+        Ok(Content::Segmented(Some(self.tail())))
     }
 
     #[inline]
     pub(super) fn segment(&self) -> Result<Bytes<SEGMENT>, MessageError> {
-        let len = SEGMENT - usize::from(self.command() >> 1 & 7);
+        let len = SEGMENT as u8 - (self.command() >> 1 & 7);
         self.need(1 + len)?;
-        Ok(Bytes::of_word(self.word >> 8, len))
+        Ok(Bytes::of_word(self.word >> 8, len.into()))
     }
 
     #[inline]
@@ -122,12 +116,9 @@ pub(super) const fn with_address(command: u8, at: Address, tail: u32) -> u64 {
 #[inline]
 pub(super) const fn with_content(command: u8, at: Address, content: &Content) -> u64 {
     match content {
-        Content::Expedited(bytes) => {
-            let command = command | bytes.unused() << 2 | bit::EXPEDITED | bit::SIZED;
-            with_address(command, at, bytes.word as u32)
-        }
-        Content::ExpeditedUnsized(bytes) => {
-            with_address(command | bit::EXPEDITED, at, u32::from_le_bytes(*bytes))
+        Content::Expedited { data, sized } => {
+            let size = if *sized { data.unused() << 2 | bit::SIZED } else { 0 };
+            with_address(command | bit::EXPEDITED | size, at, data.word as u32)
         }
         Content::Segmented(Some(size)) => with_address(command | bit::SIZED, at, *size),
         Content::Segmented(None) => with_address(command, at, 0),

@@ -63,7 +63,7 @@ impl Server {
 
     /// Whether a silence was answered by asking for what was lost.
     pub(super) fn ask_again(&mut self, now: Duration, objects: &mut impl Access) -> bool {
-        let again = self.state == State::BlockReceive && self.receiver.is_cut_short();
+        let again = matches!(self.state, State::BlockReceive) && self.receiver.is_cut_short();
         if again {
             self.confirm_block(now, objects);
         }
@@ -110,8 +110,9 @@ impl Server {
         if !is_block_size(block_size) {
             return Err(AbortCode::BLOCK_SIZE);
         }
-        if self.load(objects)?.is_some_and(|size| threshold > 0 && size <= u32::from(threshold)) {
-            return Ok(self.answer_upload());
+        let first = self.load(objects)?;
+        if self.size.is_some_and(|size| threshold > 0 && size <= u32::from(threshold)) {
+            return Ok(self.answer_upload(first));
         }
         self.sender = Sender::new(block_size);
         self.check = crc;

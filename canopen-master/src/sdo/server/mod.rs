@@ -24,7 +24,7 @@ const HELD: usize = 14;
 /// An encoded [`Response`].
 type Answer = [u8; 8];
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy)]
 enum State {
     Idle,
     /// A request for the next segment is awaited.
@@ -162,12 +162,12 @@ impl Server {
         if let Some(tx) = self.tx.take() {
             return Some(Frame::standard(self.channel.response, tx));
         }
-        if self.state == State::BlockSend { self.next_block_segment(now, objects) } else { None }
+        if matches!(self.state, State::BlockSend) { self.next_block_segment(now, objects) } else { None }
     }
 
     #[inline]
     fn handle_data(&mut self, now: Duration, data: &[u8], objects: &mut impl Access) {
-        if self.state == State::BlockReceive {
+        if matches!(self.state, State::BlockReceive) {
             return self.on_block_frame(now, data, objects);
         }
         let request = match Request::parse(data) {
@@ -180,7 +180,7 @@ impl Server {
         let done = match (request, self.state) {
             (Request::InitiateUpload { at }, _) => {
                 self.begin(at, objects);
-                self.begin_upload(objects)
+                self.load(objects).map(|first| self.answer_upload(first))
             }
             (Request::InitiateDownload { at, content }, _) => {
                 self.begin(at, objects);

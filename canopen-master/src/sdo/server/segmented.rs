@@ -11,18 +11,21 @@ impl Server {
     /// Reads the beginning of the object, all of it if it is short.
     #[cfg_attr(target_pointer_width = "32", inline(never))]
     #[cfg_attr(not(target_pointer_width = "32"), inline)]
-    pub(super) fn load(&mut self, objects: &mut impl Access) -> Result<Option<u32>, AbortCode> {
+    pub(super) fn load(&mut self, objects: &mut impl Access) -> Result<[u8; WHOLE], AbortCode> {
         let mut first = [0; WHOLE];
         let (len, total) = objects.read(self.at, 0, &mut first)?;
         // Less than there was room for is all there is.
         self.size = total.or((len < WHOLE).then_some(len as u32));
-        if self.is_held() {
+        if let Some(size) = self.size.filter(|&size| size <= WHOLE as u32) {
+            if len != size as usize {
+                return Err(AbortCode::NO_DATA);
+            }
             if let Some(held) = self.held.first_chunk_mut() {
                 *held = first;
             }
-            self.held_len = len as u8;
+            self.held_len = size as u8;
         }
-        Ok(self.size)
+        Ok(first)
     }
 
     /// Whether the object of an upload was short enough to be read as a whole.
@@ -31,18 +34,16 @@ impl Server {
         matches!(self.size, Some(size) if size <= WHOLE as u32)
     }
 
-    #[inline]
-    pub(super) fn begin_upload(&mut self, objects: &mut impl Access) -> Result<Answer, AbortCode> {
-        self.load(objects)?;
-        Ok(self.answer_upload())
-    }
-
-    /// The answer that begins an upload: the object itself if it is short.
+    /// The answer that begins an upload of an object whose `first` bytes were loaded: the object itself
+    /// if it is short.
     #[cfg_attr(target_pointer_width = "32", inline(never))]
     #[cfg_attr(not(target_pointer_width = "32"), inline)]
-    pub(super) fn answer_upload(&mut self) -> Answer {
+    pub(super) fn answer_upload(&mut self, first: [u8; WHOLE]) -> Answer {
         let content = match self.size {
-            Some(1..=4) => Content::Expedited(Bytes::new(self.held()).unwrap_or(Bytes::EMPTY)),
+            Some(size @ 1..=4) => {
+                let data = Bytes::of_word(u64::from_le_bytes(first), size as usize);
+                Content::Expedited { data, sized: true }
+            }
             size => {
                 self.state = State::Upload { toggle: false };
                 Content::Segmented(size)
@@ -104,13 +105,11 @@ impl Server {
     ) -> Result<Answer, AbortCode> {
         let at = self.at;
         match content {
-            Content::Expedited(bytes) => {
-                let padded = bytes.padded();
-                let data = first(&padded, bytes.len());
-                objects.write(at, &Piece { offset: 0, data, last: true, size: Some(data.len() as u32) })?;
-            }
-            Content::ExpeditedUnsized(data) => {
-                objects.write(at, &Piece { offset: 0, data: &data, last: true, size: None })?;
+            Content::Expedited { data, sized } => {
+                let padded = data.padded();
+                let data = first(&padded, data.len());
+                let size = sized.then_some(data.len() as u32);
+                objects.write(at, &Piece { offset: 0, data, last: true, size })?;
             }
             Content::Segmented(size) => {
                 objects.begin_write(at, size)?;
