@@ -178,7 +178,7 @@ fn tpdo(tester: &Tester<'_>, value: impl Fn(Pdo) -> Address) -> Checked<Pdo> {
 
 fn reserved_type(tester: &mut Tester<'_>) -> Checked {
     let pdo = tpdo(tester, |pdo| pdo.at(2))?;
-    let content = Content::Expedited(Bytes::new(&[241]).unwrap_or(Bytes::EMPTY));
+    let content = Content::Expedited { data: Bytes::new(&[241]).unwrap_or(Bytes::EMPTY), sized: true };
     let refused = tester
         .expect_abort(Request::InitiateDownload { at: pdo.at(2), content }, &[AbortCode::INVALID_VALUE]);
     tester.restart(Command::ResetCommunication)?;
@@ -317,7 +317,8 @@ fn history(tester: &mut Tester<'_>) -> Checked {
     if !tester.is_writable(at) {
         return skip("the device file has no error history (1003h) that can be cleared");
     }
-    let content = |value: u8| Content::Expedited(Bytes::new(&[value]).unwrap_or(Bytes::EMPTY));
+    let content =
+        |value: u8| Content::Expedited { data: Bytes::new(&[value]).unwrap_or(Bytes::EMPTY), sized: true };
     let request = Request::InitiateDownload { at, content: content(1) };
     tester.expect_abort(request, &[AbortCode::INVALID_VALUE])?;
     tester.write(at, &[0])?;

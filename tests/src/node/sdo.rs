@@ -223,8 +223,8 @@ fn mandatory(tester: &mut Tester<'_>) -> Checked {
 
 fn expedited_upload(tester: &mut Tester<'_>) -> Checked {
     match tester.ask(Request::InitiateUpload { at: DEVICE_TYPE })? {
-        Response::InitiateUpload { at, content: Content::Expedited(bytes) }
-            if at == DEVICE_TYPE && bytes.len() == 4 =>
+        Response::InitiateUpload { at, content: Content::Expedited { data, .. } }
+            if at == DEVICE_TYPE && data.len() == 4 =>
         {
             Ok(())
         }
@@ -235,7 +235,7 @@ fn expedited_upload(tester: &mut Tester<'_>) -> Checked {
 fn no_object(tester: &mut Tester<'_>) -> Checked {
     let at = Address::new(absent(tester), 0);
     tester.expect_abort(Request::InitiateUpload { at }, &[AbortCode::NO_OBJECT])?;
-    let content = Content::Expedited(Bytes::new(&[0; 4]).unwrap_or(Bytes::EMPTY));
+    let content = Content::Expedited { data: Bytes::new(&[0; 4]).unwrap_or(Bytes::EMPTY), sized: true };
     tester.expect_abort(Request::InitiateDownload { at, content }, &[AbortCode::NO_OBJECT])
 }
 
@@ -247,7 +247,7 @@ fn no_sub_index(tester: &mut Tester<'_>) -> Checked {
 
 fn read_only(tester: &mut Tester<'_>) -> Checked {
     let value = tester.read(DEVICE_TYPE)?;
-    let content = Content::Expedited(Bytes::new(&value).unwrap_or(Bytes::EMPTY));
+    let content = Content::Expedited { data: Bytes::new(&value).unwrap_or(Bytes::EMPTY), sized: true };
     tester.expect_abort(Request::InitiateDownload { at: DEVICE_TYPE, content }, &[AbortCode::READ_ONLY])
 }
 
