@@ -22,4 +22,7 @@ pub mod storage;
 pub mod trajectory;
 
 pub use axis::Axis;
-pub use controller::{AXES, Controller, Model, OS_VERSION, Reset, ResetError, STORAGE_LEN};
+pub use controller::{
+    AXES, CONFIGURATION_PASSWORD, ComPort, Controller, Model, OS_VERSION, Parity, Reset, ResetError,
+    SERVICE_PASSWORD, STORAGE_LEN, SerialPort, WrongPassword,
+};

@@ -31,6 +31,18 @@ fn identity() {
     assert_eq!(Model::from_number(8232), None);
 }
 
+/// 6.3.3: 0 to 31; the number by which a select (00h) finds the device.
+#[test]
+fn parameter_005_is_the_device_number() {
+    for number in [0, 1, 31] {
+        let mut controller = new();
+        controller.write_parameter(5, number);
+        assert_eq!(controller.call_loader(), -1);
+        assert_eq!(i32::from(controller.device_number()), number);
+    }
+    assert_eq!(new().write_parameter(5, 32).code, LoaderCode(0x81));
+}
+
 /// Writes go to RAM, the loader makes them effective, 35h makes them permanent.
 #[test]
 fn parameters_live_in_three_places() {

@@ -3,8 +3,10 @@
 
 mod device;
 mod model;
+mod service;
 
 pub use model::Model;
+pub use service::{CONFIGURATION_PASSWORD, ComPort, Parity, SERVICE_PASSWORD, SerialPort, WrongPassword};
 
 use core::time::Duration;
 
@@ -64,6 +66,8 @@ pub struct Controller<S, R> {
     retain: bool,
     /// Whether a scan that was begun by hand is under way.
     manual_scan: bool,
+    /// Whether user interfaces let everybody configure, until power is lost (4.3.4.5).
+    service_mode: bool,
     /// Write pointers of 23h for banks 15 and 16.
     pointers: [usize; 2],
 }
@@ -108,6 +112,7 @@ impl<S: Storage, R: AsRef<[u8]> + AsMut<[u8]>> Controller<S, R> {
             since_retained: Duration::ZERO,
             retain: false,
             manual_scan: false,
+            service_mode: false,
             pointers: [0; 2],
         }
     }

@@ -186,6 +186,22 @@ mod tests {
         assert_eq!(get(930).unwrap().parse("-0.05", &values), Ok(-5));
     }
 
+    /// Of an input, an output, an axis: each its own.
+    #[test]
+    fn parameters_013_020_and_026_place_the_decimal_point() {
+        for (point, first) in [(13, 247), (20, 516), (26, 930)] {
+            for instance in 0..3 {
+                let mut values = Values::factory();
+                values.set(point + instance, 3).unwrap();
+                let shown = |at: u16| get(first + at).unwrap().format(12_345, &values).to_string();
+                for at in 0..3 {
+                    let expected = if at == instance { "12.345" } else { "12345" };
+                    assert_eq!(shown(at), expected, "[{:03}] with [{:03}]", first + at, point + instance);
+                }
+            }
+        }
+    }
+
     #[test]
     fn errors_say_what_the_parameter_takes() {
         let values = Values::factory();

@@ -109,8 +109,11 @@ fn control(
         let endpoint = serial.endpoint()?;
         let port = open(&endpoint, Role::Device).map_err(|error| Exit::trouble(error.to_string()))?;
         // LB2 has the port that CoDeSys does not have (6.3.3, [006]).
-        let codesys = if controller.working().at(6, 0) == 0 { ComPort::Com1 } else { ComPort::Com2 };
-        if serial.port == codesys {
+        let com = match serial.port {
+            ComPort::Com1 => motion_core::ComPort::Com1,
+            ComPort::Com2 => motion_core::ComPort::Com2,
+        };
+        if controller.serial_port(com).codesys {
             out.remark(format!("{endpoint}: [006] gives this port to CoDeSys; LB2 answers all the same"));
         }
         lines.push((endpoint.to_string(), Line::new(port)));
