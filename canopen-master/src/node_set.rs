@@ -37,6 +37,8 @@ impl NodeSet {
 
     /// How many nodes are in it, 0…127.
     #[must_use]
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    #[cfg_attr(not(target_pointer_width = "32"), inline)]
     pub fn len(self) -> usize {
         self.0.iter().map(|word| word.count_ones() as usize).sum()
     }
@@ -103,6 +105,8 @@ impl NodeSet {
     }
 
     /// Takes the lowest out.
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    #[cfg_attr(not(target_pointer_width = "32"), inline)]
     pub fn pop(&mut self) -> Option<NodeId> {
         for (word, bits) in (0..).zip(&mut self.0) {
             if *bits != 0 {

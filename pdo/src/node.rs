@@ -36,7 +36,7 @@ impl NodeId {
 
     /// All addresses in order.
     pub fn all() -> impl Iterator<Item = Self> {
-        (1..=127).map(Self)
+        (1..128).map(Self)
     }
 }
 

@@ -16,7 +16,7 @@ use crate::sdo::Outcome;
 const HEARTBEAT_TIME: Address = Address::new(0x1017, 0);
 
 /// What the master has to do next.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy)]
 pub(crate) enum Action<'d> {
     /// Nothing until something comes, or the deadline.
     Wait,

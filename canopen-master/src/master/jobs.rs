@@ -79,7 +79,7 @@ impl<'d, B: Buffer, const N: usize> Master<'d, B, N> {
         let Some(node) = self.node_mut(id) else { return };
         let Job::Boot(process) = &mut node.job else { return };
         let timeout = process.answer_time();
-        if action == Action::Nmt(Command::Start) {
+        if matches!(action, Action::Nmt(Command::Start)) {
             action = process.on_done();
             self.start_due.insert(id);
         }

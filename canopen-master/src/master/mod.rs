@@ -183,10 +183,9 @@ impl<'d, B: Buffer, const N: usize> Master<'d, B, N> {
     /// A master that does nothing yet.
     #[must_use]
     pub fn new(config: Config) -> Self {
-        let mut ids = NodeId::all();
         Self {
             config,
-            nodes: core::array::from_fn(|_| Node::new(ids.next().unwrap_or(Self::LAST))),
+            nodes: core::array::from_fn(|index| Node::new(NodeId::new(index as u8 + 1).unwrap_or(Self::LAST))),
             seen: NodeSet::EMPTY,
             guard_due: NodeSet::EMPTY,
             ask_due: NodeSet::EMPTY,
@@ -344,6 +343,8 @@ impl<'d, B: Buffer, const N: usize> Master<'d, B, N> {
     }
 
     /// A deadline has been set.
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    #[cfg_attr(not(target_pointer_width = "32"), inline)]
     fn due(&mut self, at: Option<Duration>) {
         self.bound = earlier(self.bound, at);
     }

@@ -31,10 +31,10 @@ impl<'d, B: Buffer, const N: usize> Master<'d, B, N> {
             return Handled::Ignored;
         }
         match id & 0x780 {
-            0x180 => self.on_pdo::<0>(node, frame.data()),
-            0x280 => self.on_pdo::<1>(node, frame.data()),
-            0x380 => self.on_pdo::<2>(node, frame.data()),
-            0x480 => self.on_pdo::<3>(node, frame.data()),
+            0x180 => self.on_pdo(0, node, frame.data()),
+            0x280 => self.on_pdo(1, node, frame.data()),
+            0x380 => self.on_pdo(2, node, frame.data()),
+            0x480 => self.on_pdo(3, node, frame.data()),
             cob::ERROR_CONTROL => self.on_error_control(now, node, frame.data()),
             cob::SDO_RESPONSE => self.on_sdo(now, node, frame),
             cob::EMCY => self.on_emergency(now, node, frame.data()),
@@ -43,13 +43,17 @@ impl<'d, B: Buffer, const N: usize> Master<'d, B, N> {
         Handled::Taken
     }
 
-    #[inline]
-    fn on_pdo<const NUMBER: usize>(&mut self, id: NodeId, data: &[u8]) {
-        let Some(node) = self.nodes.get_mut(usize::from(id.raw()) - 1) else { return };
-        const { assert!(NUMBER < 4, "a node has four default PDOs") };
-        node.inputs[NUMBER].set(data);
-        self.input_new[NUMBER].insert(id);
-        self.input_flag[NUMBER].insert(id);
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    #[cfg_attr(not(target_pointer_width = "32"), inline)]
+    fn on_pdo(&mut self, number: usize, id: NodeId, data: &[u8]) {
+        let node = self.nodes.get_mut(usize::from(id.raw()) - 1);
+        let Some(image) = node.and_then(|node| node.inputs.get_mut(number)) else { return };
+        let (Some(new), Some(flag)) = (self.input_new.get_mut(number), self.input_flag.get_mut(number)) else {
+            return;
+        };
+        image.set(data);
+        new.insert(id);
+        flag.insert(id);
     }
 
     #[inline]

@@ -55,7 +55,7 @@ impl<B: Buffer, const N: usize> Master<'_, B, N> {
         }
         if let Job::Boot(process) = &mut node.job {
             let action = process.on_timeout(now);
-            if action != Action::Wait {
+            if !matches!(action, Action::Wait) {
                 self.carry_out(now, id, action);
             }
         }

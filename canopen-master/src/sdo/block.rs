@@ -14,7 +14,13 @@ pub(super) const fn is_block_size(block_size: u8) -> bool {
     matches!(block_size, 1..=MAX_BLOCK_SIZE)
 }
 
-const CRC: crc::Crc<u16, crc::Table<1>> = crc::Crc::<u16, crc::Table<1>>::new(&crc::CRC_16_XMODEM);
+/// A small target has no room for a table, and time: a segment comes at most every 0.1 ms.
+#[cfg(target_pointer_width = "32")]
+type Steps = crc::NoTable;
+#[cfg(not(target_pointer_width = "32"))]
+type Steps = crc::Table<1>;
+
+const CRC: crc::Crc<u16, Steps> = crc::Crc::<u16, Steps>::new(&crc::CRC_16_XMODEM);
 
 /// The check sum over a block transfer: x^16 + x^12 + x^5 + 1, initially 0, not reflected (7.2.4.3.16).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

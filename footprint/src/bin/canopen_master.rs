@@ -10,8 +10,8 @@ use canopen_master::lss::Operation;
 use canopen_master::master::{BusStatus, Config, Master};
 use canopen_master::nmt::{Command, Target};
 use canopen_master::sdo::{Options, Small};
-use canopen_master::{Address, Frame, NodeId, NodeSet, guarding, scan, sync};
-use footprint::{now, wire};
+use canopen_master::{Address, NodeId, NodeSet, guarding, scan, sync};
+use footprint::{now, received, wire};
 use pdo::DefaultPdo;
 
 type Engine = Master<'static, Small, 16>;
@@ -34,8 +34,19 @@ static BOOT: boot::Config<'static> = boot::Config {
 
 #[unsafe(no_mangle)]
 extern "C" fn _start() {
-    let mut engine = Engine::new(black_box(Config::default()));
-    let master = black_box(&mut engine);
+    let mut master = engine();
+    command(black_box(&mut master));
+    while step(black_box(&mut master)) {}
+}
+
+#[inline(never)]
+fn engine() -> Engine {
+    Engine::new(black_box(Config::default()))
+}
+
+/// What an application asks for.
+#[inline(never)]
+fn command(master: &mut Engine) {
     let node = black_box(NodeId::MIN);
     let at = black_box(Address::new(0x1000, 0));
     let options = black_box(Options::block(now()));
@@ -49,30 +60,25 @@ extern "C" fn _start() {
     black_box(master.boot(now(), node, black_box(&BOOT)).is_ok());
     black_box(master.scan(black_box(NodeSet::ALL), black_box(scan::Options::default())).is_ok());
     black_box(master.lss(black_box(Operation::Fastscan)).is_ok());
-    loop {
-        if let Some(frame) = Frame::data_frame(black_box(embedded_can_id()), wire().get(..8).unwrap_or(&[])) {
-            black_box(master.handle_frame(now(), &frame));
-        }
-        master.handle_timeout(now());
-        master.handle_bus(now(), black_box(BusStatus::Active));
-        while let Some(frame) = master.poll_transmit(now()) {
-            if black_box(false) {
-                master.handle_refused(frame);
-            }
-            black_box(&frame);
-        }
-        while let Some(event) = master.poll_event() {
-            black_box(&event);
-        }
-        while let Some((node, number)) = master.poll_pdo() {
-            black_box(master.pdo(node, number));
-        }
-        if black_box(master.poll_timeout()).is_none() {
-            return;
-        }
-    }
 }
 
-fn embedded_can_id() -> embedded_can::StandardId {
-    embedded_can::StandardId::ZERO
+/// What a firmware does from its interrupts and its main loop.
+#[inline(never)]
+fn step(master: &mut Engine) -> bool {
+    black_box(master.handle_frame(now(), &received()));
+    master.handle_timeout(now());
+    master.handle_bus(now(), black_box(BusStatus::Active));
+    while let Some(frame) = master.poll_transmit(now()) {
+        black_box(&frame);
+        if black_box(false) {
+            master.handle_refused(frame);
+        }
+    }
+    while let Some(event) = master.poll_event() {
+        black_box(&event);
+    }
+    while let Some((node, number)) = master.poll_pdo() {
+        black_box(master.pdo(node, number));
+    }
+    black_box(master.poll_timeout()).is_some()
 }

@@ -9,7 +9,7 @@ use canopen_master::data_type::DataType;
 use canopen_master::emcy::ErrorCode;
 use canopen_master::lss::Identity;
 use canopen_master::od::{Communication, Dictionary, Entry, PdoSlot, Pdos, Rights, Table};
-use canopen_master::slave::{Config, Device, Event, Slave};
+use canopen_master::slave::{Config, Device, Slave};
 use canopen_master::{BusStatus, NodeId};
 use footprint::{now, received};
 use pdo::{CobId, Mapping};
@@ -46,17 +46,24 @@ static ENGINE_STATE: [u8; size_of::<Engine<'static>>()] = [0; size_of::<Engine<'
 extern "C" fn _start() {
     let mut memory = black_box([0; TABLE.memory()]);
     let Ok(dictionary) = Dictionary::new(TABLE.view(), &mut memory, ()) else { return };
-    let slot = PdoSlot::new(Communication::event_driven(black_box(CobId(0x181))), Mapping::EMPTY);
-    let pdos = Pdos::new([slot; 4], [slot; 4]);
-    let config = black_box(Config::new(Identity::default(), Some(NodeId::MIN)));
-    let mut slave = Engine::new(&config, Device { dictionary, pdos });
-    slave.boot(now());
-    // As a firmware does from its interrupts and its main loop.
+    let mut slave = engine(dictionary);
     while step(black_box(&mut slave)) {}
 }
 
 #[inline(never)]
+fn engine(dictionary: Dictionary<'_, ()>) -> Engine<'_> {
+    let slot = PdoSlot::new(Communication::event_driven(black_box(CobId(0x181))), Mapping::EMPTY);
+    let pdos = Pdos::new([slot; 4], [slot; 4]);
+    let config = black_box(Config::new(Identity::default(), Some(NodeId::MIN)));
+    Engine::new(&config, Device { dictionary, pdos })
+}
+
+/// What a firmware does from its interrupts and its main loop.
+#[inline(never)]
 fn step(slave: &mut Engine<'_>) -> bool {
+    if black_box(true) {
+        black_box(slave.boot(now()));
+    }
     black_box(slave.handle_frame(now(), &received()));
     slave.handle_timeout(now());
     slave.handle_bus(now(), black_box(BusStatus::Active));
@@ -67,9 +74,6 @@ fn step(slave: &mut Engine<'_>) -> bool {
     }
     while let Some(event) = slave.poll_event() {
         black_box(&event);
-        if matches!(event, Event::ResetNode | Event::ResetCommunication) {
-            black_box(slave.boot(now()));
-        }
     }
     black_box(slave.poll_timeout()).is_some()
 }
