@@ -7,6 +7,7 @@ extern crate std;
 
 mod address;
 pub mod cob;
+mod communication;
 mod frame;
 mod handled;
 pub mod layout;
@@ -18,12 +19,13 @@ mod tpdo;
 mod transmission;
 
 pub use address::Address;
+pub use communication::Communication;
 pub use cob::{CobId, DefaultPdo, Service};
 pub use frame::Frame;
 pub use handled::Handled;
 pub use mapping::Mapping;
 pub use node::{NodeId, NodeIdError};
 pub use payload::{Bits, Payload};
-pub use rpdo::{Rpdo, RpdoConfig, RpdoEvent};
-pub use tpdo::{Tpdo, TpdoConfig};
+pub use rpdo::{Rpdo, RpdoEvent};
+pub use tpdo::Tpdo;
 pub use transmission::{Transmission, TransmissionError};

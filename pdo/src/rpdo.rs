@@ -3,30 +3,7 @@
 use core::time::Duration;
 
 use crate::mapping::LengthError;
-use crate::{CobId, Handled, Payload, Transmission};
-
-/// Communication parameters of a received PDO (CiA 301, 7.5.2.35).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct RpdoConfig {
-    /// Sub-index 01h. One that is not valid, or has 29 bits, receives nothing.
-    pub cob_id: CobId,
-    /// Sub-index 02h.
-    pub transmission: Transmission,
-    /// Sub-index 05h, 1 ms a unit: longest time between two PDOs; zero: any.
-    pub timeout: Duration,
-    /// Bytes that are mapped, 0…8.
-    pub bytes: u8,
-}
-
-impl RpdoConfig {
-    /// Receives nothing.
-    pub const OFF: Self = Self {
-        cob_id: CobId(CobId::INVALID),
-        transmission: Transmission::EventProfile,
-        timeout: Duration::ZERO,
-        bytes: 0,
-    };
-}
+use crate::{Communication, Handled, Payload};
 
 /// What [`Rpdo::poll_event`] tells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -46,17 +23,19 @@ pub enum RpdoEvent {
 /// A received PDO.
 ///
 /// - Input: [`handle_frame`](Self::handle_frame), [`handle_sync`](Self::handle_sync),
-///   [`handle_timeout`](Self::handle_timeout), [`reset`](Self::reset).
+///   [`handle_timeout`](Self::handle_timeout).
 /// - Output: [`poll_event`](Self::poll_event), [`poll_timeout`](Self::poll_timeout).
 ///
 /// A newer PDO replaces one that has not taken effect or was not polled yet. The time-out runs from the
 /// first PDO on.
 #[derive(Debug, Clone, Copy)]
 pub struct Rpdo {
-    config: RpdoConfig,
-    /// Taken from `config`; an identifier that no frame has where it is not valid.
+    /// [`NONE`] where it does not exist.
     id: u16,
     synchronous: bool,
+    bytes: u8,
+    /// Zero: any.
+    timeout: Duration,
     waiting: Option<Payload>,
     ready: Option<Payload>,
     fault: Option<RpdoEvent>,
@@ -68,35 +47,23 @@ pub struct Rpdo {
 const NONE: u16 = 0xFFFF;
 
 impl Rpdo {
-    /// Before the first PDO.
+    /// Before the first PDO; `bytes` are mapped, 0…8.
     #[must_use]
-    pub const fn new(config: RpdoConfig) -> Self {
-        let id = match config.cob_id.standard_id() {
-            Some(id) if config.cob_id.is_valid() => id,
-            _ => NONE,
-        };
-        let synchronous = config.transmission.is_synchronous();
+    pub const fn new(communication: &Communication, bytes: u8) -> Self {
         Self {
-            config,
-            id,
-            synchronous,
+            id: match communication.id() {
+                Some(id) => id,
+                None => NONE,
+            },
+            synchronous: communication.transmission.is_synchronous(),
+            bytes,
+            timeout: Duration::from_millis(communication.event_timer as u64),
             waiting: None,
             ready: None,
             fault: None,
             was_too_long: false,
             deadline: None,
         }
-    }
-
-    /// The parameters.
-    #[must_use]
-    pub const fn config(&self) -> &RpdoConfig {
-        &self.config
-    }
-
-    /// Forgets what was received, as at a change of the NMT state, and takes over parameters.
-    pub fn reset(&mut self, config: RpdoConfig) {
-        *self = Self::new(config);
     }
 
     /// Takes a frame from the bus.
@@ -112,7 +79,7 @@ impl Rpdo {
 
     #[inline]
     fn receive(&mut self, now: Duration, mut payload: Payload) {
-        let expected = self.config.bytes;
+        let expected = self.bytes;
         if payload.len() != expected {
             let error = LengthError { expected, found: payload.len() };
             if payload.len() < expected {
@@ -126,8 +93,8 @@ impl Rpdo {
         } else {
             self.was_too_long = false;
         }
-        if !self.config.timeout.is_zero() {
-            self.deadline = Some(now.saturating_add(self.config.timeout));
+        if !self.timeout.is_zero() {
+            self.deadline = Some(now.saturating_add(self.timeout));
         }
         if self.synchronous {
             self.waiting = Some(payload);
@@ -172,19 +139,16 @@ impl Rpdo {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Frame;
+    use crate::{CobId, Frame, Transmission};
 
     const fn ms(ms: u64) -> Duration {
         Duration::from_millis(ms)
     }
 
     fn rpdo(transmission: u8) -> Rpdo {
-        Rpdo::new(RpdoConfig {
-            cob_id: CobId(0x201),
-            transmission: Transmission::new(transmission).unwrap(),
-            timeout: ms(100),
-            bytes: 2,
-        })
+        let transmission = Transmission::new(transmission).unwrap();
+        let communication = Communication::event_driven(CobId(0x201));
+        Rpdo::new(&Communication { transmission, event_timer: 100, ..communication }, 2)
     }
 
     #[test]
@@ -248,8 +212,7 @@ mod tests {
 
     #[test]
     fn not_valid_receives_nothing() {
-        let config = RpdoConfig { cob_id: CobId(0x8000_0201), ..*rpdo(255).config() };
-        let mut rpdo = Rpdo::new(config);
+        let mut rpdo = Rpdo::new(&Communication::event_driven(CobId(0x8000_0201)), 2);
         assert_eq!(rpdo.handle_frame(ms(0), &Frame::standard(0x201, [1, 2])), Handled::Ignored);
     }
 }

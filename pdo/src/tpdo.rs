@@ -4,37 +4,11 @@ use core::time::Duration;
 
 use embedded_can::{Id, StandardId};
 
-use crate::{CobId, Frame, Handled, Payload, Transmission};
-
-/// Communication parameters of a sent PDO (CiA 301, 7.5.2.37).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct TpdoConfig {
-    /// Sub-index 01h. One that is not valid, or has 29 bits, sends nothing.
-    pub cob_id: CobId,
-    /// Sub-index 02h.
-    pub transmission: Transmission,
-    /// Sub-index 03h, 100 µs a unit: shortest time between two event-driven PDOs.
-    pub inhibit: Duration,
-    /// Sub-index 05h, 1 ms a unit: longest time between two event-driven PDOs; zero: any.
-    pub event_timer: Duration,
-    /// Sub-index 06h: the SYNC with this counter is the first; 0: any.
-    pub sync_start: u8,
-}
-
-impl TpdoConfig {
-    /// Sends nothing.
-    pub const OFF: Self = Self {
-        cob_id: CobId(CobId::INVALID),
-        transmission: Transmission::EventProfile,
-        inhibit: Duration::ZERO,
-        event_timer: Duration::ZERO,
-        sync_start: 0,
-    };
-}
+use crate::{Communication, Frame, Handled, Payload, Transmission};
 
 /// A sent PDO.
 ///
-/// - Commands: [`trigger`](Self::trigger), [`reset`](Self::reset).
+/// - Commands: [`trigger`](Self::trigger).
 /// - Input: [`handle_sync`](Self::handle_sync), [`handle_frame`](Self::handle_frame),
 ///   [`handle_timeout`](Self::handle_timeout).
 /// - Output: [`poll_transmit`](Self::poll_transmit), [`poll_timeout`](Self::poll_timeout).
@@ -42,7 +16,7 @@ impl TpdoConfig {
 /// The data are asked for when they are due: at the SYNC of a synchronous PDO, else when it is sent.
 #[derive(Debug, Clone, Copy)]
 pub struct Tpdo {
-    config: TpdoConfig,
+    communication: Communication,
     id: Option<StandardId>,
     /// An event waits to be sent.
     pending: bool,
@@ -61,32 +35,20 @@ pub struct Tpdo {
 impl Tpdo {
     /// Before the first PDO. An event-driven one is sent once at the beginning, so that all know.
     #[must_use]
-    pub const fn new(config: TpdoConfig) -> Self {
-        let id = match config.cob_id.standard_id() {
-            Some(id) if config.cob_id.is_valid() => StandardId::new(id),
-            _ => None,
-        };
+    pub const fn new(communication: Communication) -> Self {
         Self {
-            config,
-            id,
-            pending: config.transmission.is_event_driven(),
+            communication,
+            id: match communication.id() {
+                Some(id) => StandardId::new(id),
+                None => None,
+            },
+            pending: communication.transmission.is_event_driven(),
             sampled: None,
             asked: false,
             countdown: None,
             free: Duration::ZERO,
             event: None,
         }
-    }
-
-    /// The parameters.
-    #[must_use]
-    pub const fn config(&self) -> &TpdoConfig {
-        &self.config
-    }
-
-    /// Begins anew, as on entering the NMT state operational, and takes over parameters.
-    pub fn reset(&mut self, config: TpdoConfig) {
-        *self = Self::new(config);
     }
 
     /// Something has changed: sends an event-driven PDO as soon as the inhibit time allows it, an acyclic
@@ -99,7 +61,7 @@ impl Tpdo {
     /// A SYNC has come, with its counter if it has one. `data` is asked where the PDO is due.
     #[inline]
     pub fn handle_sync(&mut self, counter: Option<u8>, data: impl FnOnce() -> Payload) {
-        let due = match self.config.transmission {
+        let due = match self.communication.transmission {
             Transmission::SyncAcyclic => core::mem::take(&mut self.pending),
             Transmission::SyncCyclic(cycle) => self.is_cycle_over(cycle, counter),
             Transmission::RtrSync => true,
@@ -112,7 +74,7 @@ impl Tpdo {
 
     #[inline]
     fn is_cycle_over(&mut self, cycle: u8, counter: Option<u8>) -> bool {
-        let start = self.config.sync_start;
+        let start = self.communication.sync_start;
         let left = match (self.countdown, counter) {
             (Some(left), _) => left,
             // The counted SYNC that the cycle starts with is its first PDO.
@@ -135,7 +97,7 @@ impl Tpdo {
         if !frame.is_remote_frame() || self.id.map(Id::Standard) != Some(frame.id()) {
             return Handled::Ignored;
         }
-        if self.config.cob_id.allows_rtr() {
+        if self.communication.cob_id.allows_rtr() {
             self.asked = true;
         }
         Handled::Taken
@@ -156,7 +118,7 @@ impl Tpdo {
     #[inline]
     pub fn poll_timeout(&self) -> Option<Duration> {
         self.id?;
-        if self.pending && self.config.transmission.is_event_driven() {
+        if self.pending && self.communication.transmission.is_event_driven() {
             return Some(self.free);
         }
         self.event
@@ -167,7 +129,7 @@ impl Tpdo {
     pub fn poll_transmit(&mut self, now: Duration, data: impl FnOnce() -> Payload) -> Option<Frame> {
         let id = self.id?;
         let asked = core::mem::take(&mut self.asked);
-        let transmission = self.config.transmission;
+        let transmission = self.communication.transmission;
         let payload = match transmission {
             Transmission::RtrSync => self.sampled.filter(|_| asked)?,
             Transmission::SyncAcyclic | Transmission::SyncCyclic(_) => match self.sampled.take() {
@@ -181,9 +143,10 @@ impl Tpdo {
                     return None;
                 }
                 self.pending = false;
-                self.free = now.saturating_add(self.config.inhibit);
-                let timer = self.config.event_timer;
-                self.event = (!timer.is_zero()).then(|| now.saturating_add(timer));
+                let Communication { inhibit, event_timer, .. } = self.communication;
+                self.free = now.saturating_add(Duration::from_micros(u64::from(inhibit) * 100));
+                let timer = Duration::from_millis(event_timer.into());
+                self.event = (event_timer != 0).then(|| now.saturating_add(timer));
                 data()
             }
         };
@@ -194,17 +157,18 @@ impl Tpdo {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::CobId;
 
     const fn ms(ms: u64) -> Duration {
         Duration::from_millis(ms)
     }
 
     fn tpdo(transmission: u8, sync_start: u8) -> Tpdo {
-        Tpdo::new(TpdoConfig {
+        Tpdo::new(Communication {
             cob_id: CobId(0x181),
             transmission: Transmission::new(transmission).unwrap(),
-            inhibit: ms(10),
-            event_timer: ms(100),
+            inhibit: 100,
+            event_timer: 100,
             sync_start,
         })
     }
@@ -289,15 +253,14 @@ mod tests {
         assert!(!sent(&mut now, 0));
         now.handle_frame(&ask);
         assert!(sent(&mut now, 0) && !sent(&mut now, 0));
-        let mut refused = tpdo(253, 0);
-        refused.reset(TpdoConfig { cob_id: CobId(0x4000_0181), ..*refused.config() });
+        let refused = Communication::event_driven(CobId(0x4000_0181));
+        let mut refused = Tpdo::new(Communication { transmission: Transmission::RtrEvent, ..refused });
         assert!(refused.handle_frame(&ask).is_taken() && !sent(&mut refused, 0));
     }
 
     #[test]
     fn not_valid_sends_nothing() {
-        let mut tpdo = tpdo(255, 0);
-        tpdo.reset(TpdoConfig { cob_id: CobId(0x8000_0181), ..*tpdo.config() });
+        let mut tpdo = Tpdo::new(Communication::event_driven(CobId(0x8000_0181)));
         assert!(!sent(&mut tpdo, 0));
         assert_eq!(tpdo.poll_timeout(), None);
     }

@@ -10,7 +10,7 @@ use canopen_master::{Frame, NodeId, sync};
 use canopen_rs::pdo::{MappingEntry, PdoMapping};
 use canopen_rs::{Address as TheirAddress, Entry as TheirEntry, ObjectDictionary, Value};
 use pdo::mapping::Entry as Mapped;
-use pdo::{CobId, Mapping, Rpdo, RpdoConfig, RpdoEvent, Transmission};
+use pdo::{CobId, Communication, Mapping, Rpdo, RpdoEvent};
 
 use super::Judge;
 
@@ -94,13 +94,8 @@ fn our_cycle(master: &mut Master<'static, Small, 127>, now: &mut Duration, frame
 pub(super) fn run(judge: &mut Judge) {
     let entries = [1, 2, 3, 4].map(|sub| Mapped::new(0x6401, sub, 16));
     let mapping: Mapping<4> = Mapping::new(&entries).expect("64 bits");
-    let config = RpdoConfig {
-        cob_id: CobId(0x285),
-        transmission: Transmission::EventProfile,
-        timeout: Duration::from_millis(100),
-        bytes: mapping.bytes(),
-    };
-    let mut rpdo = Rpdo::new(config);
+    let communication = Communication { event_timer: 100, ..Communication::event_driven(CobId(0x285)) };
+    let mut rpdo = Rpdo::new(&communication, mapping.bytes());
     let bytes = [1, 2, 3, 4, 5, 6, 7, 8];
     let frame = Frame::standard(0x285, bytes);
     let mut od = ObjectDictionary::<16>::new();

@@ -15,5 +15,6 @@ mod table;
 pub use dictionary::{Dictionary, RamError};
 pub use entry::{Entry, Initial, Limits, Place, Rights};
 pub use hooks::{Hooks, Stored};
-pub use pdos::{Communication, Objects, PdoSlot, Pdos};
+pub use pdo::Communication;
+pub use pdos::{Objects, PdoSlot, Pdos};
 pub use table::{Table, TableError, View};

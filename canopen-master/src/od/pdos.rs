@@ -5,36 +5,12 @@ use core::time::Duration;
 
 use pdo::mapping::{Entry as Mapped, MappingError};
 use pdo::{
-    Address, CobId, Frame, Handled, Mapping, Payload, Rpdo, RpdoConfig, RpdoEvent, Tpdo, TpdoConfig,
-    Transmission, cob,
+    Address, CobId, Communication, Frame, Handled, Mapping, Payload, Rpdo, RpdoEvent, Tpdo, Transmission, cob,
 };
 
 use super::{Dictionary, Hooks};
 use crate::clock::earlier;
 use crate::sdo::{AbortCode, Access, Piece, Total, read_slice};
-
-/// Communication parameters in the units of the objects.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Communication {
-    /// Sub-index 01h.
-    pub cob_id: CobId,
-    /// Sub-index 02h.
-    pub transmission: Transmission,
-    /// Sub-index 03h, 100 µs.
-    pub inhibit: u16,
-    /// Sub-index 05h, 1 ms.
-    pub event_timer: u16,
-    /// Sub-index 06h, of a TPDO.
-    pub sync_start: u8,
-}
-
-impl Communication {
-    /// Event-driven, by the device profile, with this COB-ID.
-    #[must_use]
-    pub const fn event_driven(cob_id: CobId) -> Self {
-        Self { cob_id, transmission: Transmission::EventProfile, inhibit: 0, event_timer: 0, sync_start: 0 }
-    }
-}
 
 /// One PDO: its parameters and its up to `M` mapped objects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -52,23 +28,9 @@ impl<const M: usize> PdoSlot<M> {
         Self { communication, mapping }
     }
 
-    /// A PDO that maps nothing is not valid.
-    const fn cob_id(&self) -> CobId {
-        let cob_id = self.communication.cob_id;
-        cob_id.with_valid(cob_id.is_valid() && self.mapping.bits() > 0)
-    }
-
-    fn rpdo(&self) -> RpdoConfig {
-        let Communication { transmission, event_timer, .. } = self.communication;
-        let timeout = Duration::from_millis(event_timer.into());
-        RpdoConfig { cob_id: self.cob_id(), transmission, timeout, bytes: self.mapping.bytes() }
-    }
-
-    fn tpdo(&self) -> TpdoConfig {
-        let Communication { transmission, inhibit, event_timer, sync_start, .. } = self.communication;
-        let inhibit = Duration::from_micros(u64::from(inhibit) * 100);
-        let event_timer = Duration::from_millis(event_timer.into());
-        TpdoConfig { cob_id: self.cob_id(), transmission, inhibit, event_timer, sync_start }
+    /// A PDO that maps nothing does not exist.
+    fn effective(&self) -> &Communication {
+        if self.mapping.bits() > 0 { &self.communication } else { &Communication::OFF }
     }
 
     /// The value of a parameter and its bytes.
@@ -197,8 +159,8 @@ impl<const R: usize, const T: usize, const M: usize> Pdos<R, T, M> {
     /// With these parameters, not running.
     #[must_use]
     pub const fn new(rpdo_slots: [PdoSlot<M>; R], tpdo_slots: [PdoSlot<M>; T]) -> Self {
-        let rpdos = [const { Rpdo::new(RpdoConfig::OFF) }; R];
-        let tpdos = [const { Tpdo::new(TpdoConfig::OFF) }; T];
+        let rpdos = [const { Rpdo::new(&Communication::OFF, 0) }; R];
+        let tpdos = [const { Tpdo::new(Communication::OFF) }; T];
         Self { rpdo_slots, tpdo_slots, rpdos, tpdos, running: false }
     }
 
@@ -304,11 +266,11 @@ impl<const R: usize, const T: usize, const M: usize> Pdos<R, T, M> {
     /// A PDO begins anew, with its parameters as they are now.
     fn restart(&mut self, rpdo: bool, number: usize) {
         if rpdo {
-            let Some(slot) = self.rpdo_slots.get(number) else { return };
-            self.rpdos.get_mut(number).into_iter().for_each(|rpdo| rpdo.reset(slot.rpdo()));
-        } else {
-            let Some(slot) = self.tpdo_slots.get(number) else { return };
-            self.tpdos.get_mut(number).into_iter().for_each(|tpdo| tpdo.reset(slot.tpdo()));
+            if let (Some(rpdo), Some(slot)) = (self.rpdos.get_mut(number), self.rpdo_slots.get(number)) {
+                *rpdo = Rpdo::new(slot.effective(), slot.mapping.bytes());
+            }
+        } else if let (Some(tpdo), Some(slot)) = (self.tpdos.get_mut(number), self.tpdo_slots.get(number)) {
+            *tpdo = Tpdo::new(*slot.effective());
         }
     }
 

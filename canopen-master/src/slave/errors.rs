@@ -18,20 +18,17 @@ impl Errors {
         Self { active: [None; EMERGENCIES], producer: Producer::new(0) }
     }
 
-    pub(super) const fn register(&self) -> u8 {
-        let mut register = 0;
-        let mut rest: &[Option<ErrorCode>] = &self.active;
-        while let [first, tail @ ..] = rest {
-            if let Some(code) = first {
-                register |= code.register_bit();
-            }
-            rest = tail;
-        }
-        register
+    pub(super) fn register(&self) -> u8 {
+        self.active.iter().flatten().fold(0, |register, code| register | code.register_bit())
     }
 
     pub(super) const fn producer(&mut self) -> &mut Producer<EMERGENCIES> {
         &mut self.producer
+    }
+
+    /// As 1003h shows it.
+    pub(super) fn history(&self) -> &[u32] {
+        self.producer.history()
     }
 
     pub(super) fn poll_timeout(&self) -> Option<Duration> {

@@ -180,7 +180,7 @@ impl<D: Objects> Slave<D> {
 
     /// The error register (1001h).
     #[must_use]
-    pub const fn error_register(&self) -> u8 {
+    pub fn error_register(&self) -> u8 {
         self.errors.register()
     }
 
@@ -345,14 +345,8 @@ impl<D: Objects> Slave<D> {
     }
 
     /// The SDO server and what it serves.
-    fn serving(&mut self) -> (&mut Server, View<'_, D, EMERGENCIES>) {
-        let register = self.errors.register();
-        let view = View {
-            dictionary: &mut self.objects,
-            register,
-            emergencies: self.errors.producer(),
-            written: None,
-        };
+    fn serving(&mut self) -> (&mut Server, View<'_, D>) {
+        let view = View { dictionary: &mut self.objects, errors: &mut self.errors, written: None };
         (&mut self.server, view)
     }
 

@@ -2,7 +2,7 @@
 
 use pdo::Address;
 
-use crate::emcy;
+use super::errors::Errors;
 use crate::sdo::{AbortCode, Access, Piece, Total, read_slice};
 
 /// Error register.
@@ -12,25 +12,23 @@ const ERROR_HISTORY: u16 = 0x1003;
 
 /// The application's dictionary as the SDO server sees it: 1001h and 1003h are the engine's, and what
 /// is written to the communication area is noted, so that it takes effect.
-pub(super) struct View<'a, D, const E: usize> {
+pub(super) struct View<'a, D> {
     pub(super) dictionary: &'a mut D,
-    pub(super) register: u8,
-    pub(super) emergencies: &'a mut emcy::Producer<E>,
+    pub(super) errors: &'a mut Errors,
     /// The last object written.
     pub(super) written: Option<Address>,
 }
 
-impl<D: Access, const E: usize> Access for View<'_, D, E> {
+impl<D: Access> Access for View<'_, D> {
     fn read(&mut self, at: Address, offset: u32, out: &mut [u8]) -> Result<(usize, Total), AbortCode> {
-        match (at.index, at.sub) {
-            (ERROR_REGISTER, 0) => Ok(read_slice(&[self.register], offset, out)),
-            (ERROR_HISTORY, 0) => Ok(read_slice(&[self.emergencies.history().len() as u8], offset, out)),
-            (ERROR_HISTORY, sub) => match self.emergencies.history().get(usize::from(sub) - 1) {
-                Some(entry) => Ok(read_slice(&entry.to_le_bytes(), offset, out)),
-                None => Err(AbortCode::NO_DATA),
-            },
-            _ => self.dictionary.read(at, offset, out),
-        }
+        let history = self.errors.history();
+        let (value, size) = match (at.index, at.sub) {
+            (ERROR_REGISTER, 0) => (self.errors.register().into(), 1),
+            (ERROR_HISTORY, 0) => (history.len() as u32, 1),
+            (ERROR_HISTORY, sub) => (*history.get(usize::from(sub) - 1).ok_or(AbortCode::NO_DATA)?, 4),
+            _ => return self.dictionary.read(at, offset, out),
+        };
+        Ok(read_slice(value.to_le_bytes().get(..size).unwrap_or(&[]), offset, out))
     }
 
     fn begin_write(&mut self, at: Address, size: Option<u32>) -> Result<(), AbortCode> {
@@ -45,7 +43,7 @@ impl<D: Access, const E: usize> Access for View<'_, D, E> {
             (ERROR_REGISTER, _) | (ERROR_HISTORY, 1..) => Err(AbortCode::READ_ONLY),
             (ERROR_HISTORY, 0) if piece.data.iter().any(|byte| *byte != 0) => Err(AbortCode::INVALID_VALUE),
             (ERROR_HISTORY, 0) => {
-                self.emergencies.clear_history();
+                self.errors.producer().clear_history();
                 Ok(())
             }
             _ => {
