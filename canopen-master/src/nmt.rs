@@ -27,8 +27,15 @@ impl Command {
 
     /// The command of a command specifier.
     #[must_use]
-    pub fn from_raw(raw: u8) -> Option<Self> {
-        Self::ALL.into_iter().find(|command| *command as u8 == raw)
+    pub const fn from_raw(raw: u8) -> Option<Self> {
+        Some(match raw {
+            0x01 => Self::Start,
+            0x02 => Self::Stop,
+            0x80 => Self::EnterPreOperational,
+            0x81 => Self::ResetNode,
+            0x82 => Self::ResetCommunication,
+            _ => return None,
+        })
     }
 
     /// The state a node shows when it has carried the command out; both resets end with a boot-up

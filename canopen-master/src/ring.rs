@@ -31,7 +31,7 @@ impl<T: Copy, const N: usize> Ring<T, N> {
     }
 
     pub(crate) fn pop(&mut self) -> Option<T> {
-        let item = self.slots.get_mut(self.head)?.take()?;
+        let item = self.slots.get(self.head).copied()?.filter(|_| self.len > 0)?;
         self.head = if self.head + 1 >= N { 0 } else { self.head + 1 };
         self.len -= 1;
         Some(item)

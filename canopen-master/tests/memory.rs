@@ -18,7 +18,7 @@ use canopen_master::slave::{self, Device, Slave};
 use canopen_master::{Address, NodeId, NodeSet, emcy, guarding, scan, sync};
 use pdo::cob::DefaultPdo;
 use pdo::mapping::Entry as Mapped;
-use pdo::{CobId, Mapping, RpdoEvent, Transmission};
+use pdo::{CobId, Mapping, RpdoFault, Transmission};
 
 struct Counting;
 
@@ -213,7 +213,7 @@ fn wrong_lengths_of_pdos_are_told() {
         slave.handle_frame(now, &frame);
         let event = core::iter::from_fn(|| slave.poll_event()).last();
         let told =
-            matches!(event, Some(slave::Event::Rpdo(0, RpdoEvent::TooShort(_) | RpdoEvent::TooLong(_))));
+            matches!(event, Some(slave::Event::Rpdo(0, Err(RpdoFault::TooShort(_) | RpdoFault::TooLong(_)))));
         assert!(told, "{event:?}");
     }
     exchange(now, &mut master, &mut slave, |_| {});

@@ -11,7 +11,7 @@ use canopen_master::sdo::{
 use canopen_master::{Address, Frame};
 use core::time::Duration;
 use pdo::mapping::Entry as Mapped;
-use pdo::{CobId, Mapping, RpdoEvent};
+use pdo::{CobId, Mapping, RpdoFault};
 
 const PERCENT: Limits = Limits { low: -100, high: 100 };
 
@@ -260,10 +260,7 @@ fn mapping_at_run_time() {
     device.objects.pdos.handle_frame(Duration::ZERO, &Frame::standard(0x333, [0xFE, 0xFF, 9, 9, 9, 9, 0x77]));
     assert_eq!(device.objects.pdos.poll_event(&mut device.objects.dictionary), None, "waits for SYNC");
     device.objects.pdos.handle_sync(None, &device.objects.dictionary);
-    assert!(matches!(
-        device.objects.pdos.poll_event(&mut device.objects.dictionary),
-        Some((0, RpdoEvent::Data(_)))
-    ));
+    assert!(matches!(device.objects.pdos.poll_event(&mut device.objects.dictionary), Some((0, Ok(())))));
     assert_eq!(device.objects.dictionary.get::<i16>(Address::new(0x6411, 1)), Ok(-2));
     assert_eq!(device.objects.dictionary.get::<u8>(Address::new(0x6200, 1)), Ok(0x77));
 }
@@ -278,12 +275,12 @@ fn process_data() {
     pdos.start();
     assert_eq!(pdos.poll_transmit(Duration::ZERO, &dictionary), Some(Frame::standard(0x181, [0x5A])));
     assert!(pdos.handle_frame(Duration::ZERO, &frame).is_taken());
-    assert!(matches!(pdos.poll_event(&mut dictionary), Some((0, RpdoEvent::Data(_)))));
+    assert!(matches!(pdos.poll_event(&mut dictionary), Some((0, Ok(())))));
     assert_eq!(dictionary.get::<u8>(Address::new(0x6200, 1)), Ok(0xA5));
     assert_eq!(dictionary.get::<bool>(Address::new(0x6200, 2)), Ok(true));
     assert_eq!(dictionary.hooks.written.len(), 2, "the dummy is nowhere");
     pdos.handle_frame(Duration::ZERO, &Frame::standard(0x201, [1]));
-    assert!(matches!(pdos.poll_event(&mut dictionary), Some((0, RpdoEvent::TooShort(_)))));
+    assert!(matches!(pdos.poll_event(&mut dictionary), Some((0, Err(RpdoFault::TooShort(_))))));
     dictionary.set(Address::new(0x6000, 1), 7u8).unwrap();
     pdos.trigger(0);
     assert_eq!(pdos.poll_transmit(Duration::ZERO, &dictionary), Some(Frame::standard(0x181, [7])));

@@ -19,13 +19,13 @@ mod tpdo;
 mod transmission;
 
 pub use address::Address;
-pub use communication::Communication;
 pub use cob::{CobId, DefaultPdo, Service};
+pub use communication::Communication;
 pub use frame::Frame;
 pub use handled::Handled;
 pub use mapping::Mapping;
 pub use node::{NodeId, NodeIdError};
 pub use payload::{Bits, Payload};
-pub use rpdo::{Rpdo, RpdoEvent};
+pub use rpdo::{Rpdo, RpdoEvent, RpdoFault};
 pub use tpdo::Tpdo;
 pub use transmission::{Transmission, TransmissionError};

@@ -7,16 +7,26 @@ use crate::{Communication, Handled, Payload};
 
 /// What [`Rpdo::poll_event`] tells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[non_exhaustive]
 pub enum RpdoEvent {
     /// Data take effect now.
     Data(Payload),
+    /// Something was wrong.
+    Fault(RpdoFault),
+}
+
+/// What can be wrong with a received PDO.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum RpdoFault {
     /// A PDO was too short and not processed (EMCY 8210h).
+    #[error("{0}: too short, not processed")]
     TooShort(LengthError),
     /// A PDO was too long; its beginning was processed (EMCY 8220h). Told once, until one of the right
     /// length has come.
+    #[error("{0}: too long, processed as far as mapped")]
     TooLong(LengthError),
     /// No PDO came in time (EMCY 8250h). Told once, until the next one has come.
+    #[error("no PDO in time")]
     TimedOut,
 }
 
@@ -38,7 +48,7 @@ pub struct Rpdo {
     timeout: Duration,
     waiting: Option<Payload>,
     ready: Option<Payload>,
-    fault: Option<RpdoEvent>,
+    fault: Option<RpdoFault>,
     was_too_long: bool,
     deadline: Option<Duration>,
 }
@@ -83,11 +93,11 @@ impl Rpdo {
         if payload.len() != expected {
             let error = LengthError { expected, found: payload.len() };
             if payload.len() < expected {
-                self.fault = Some(RpdoEvent::TooShort(error));
+                self.fault = Some(RpdoFault::TooShort(error));
                 return;
             }
             if !core::mem::replace(&mut self.was_too_long, true) {
-                self.fault = Some(RpdoEvent::TooLong(error));
+                self.fault = Some(RpdoFault::TooLong(error));
             }
             payload = Payload::new(payload.word(), expected);
         } else {
@@ -115,7 +125,7 @@ impl Rpdo {
     pub fn handle_timeout(&mut self, now: Duration) {
         if self.deadline.is_some_and(|deadline| now >= deadline) {
             self.deadline = None;
-            self.fault = Some(RpdoEvent::TimedOut);
+            self.fault = Some(RpdoFault::TimedOut);
         }
     }
 
@@ -129,8 +139,8 @@ impl Rpdo {
     /// What happened, until `None`.
     #[inline]
     pub fn poll_event(&mut self) -> Option<RpdoEvent> {
-        if self.fault.is_some() {
-            return self.fault.take();
+        if let Some(fault) = self.fault.take() {
+            return Some(RpdoEvent::Fault(fault));
         }
         self.ready.take().map(RpdoEvent::Data)
     }
@@ -179,21 +189,28 @@ mod tests {
         let mut rpdo = rpdo(254);
         rpdo.handle_frame(ms(0), &Frame::standard(0x201, [1]));
         let error = LengthError { expected: 2, found: 1 };
-        assert_eq!((rpdo.poll_event(), rpdo.poll_event()), (Some(RpdoEvent::TooShort(error)), None));
+        assert_eq!(
+            (rpdo.poll_event(), rpdo.poll_event()),
+            (Some(RpdoEvent::Fault(RpdoFault::TooShort(error))), None)
+        );
         assert_eq!(rpdo.poll_timeout(), None, "a short one is none");
         let error = LengthError { expected: 2, found: 3 };
         let data = Some(RpdoEvent::Data(Payload::from_slice(&[1, 2])));
         for told in [true, false] {
             rpdo.handle_frame(ms(0), &Frame::standard(0x201, [1, 2, 3]));
             if told {
-                assert_eq!(rpdo.poll_event(), Some(RpdoEvent::TooLong(error)));
+                assert_eq!(rpdo.poll_event(), Some(RpdoEvent::Fault(RpdoFault::TooLong(error))));
             }
             assert_eq!((rpdo.poll_event(), rpdo.poll_event()), (data, None));
         }
         rpdo.handle_frame(ms(0), &Frame::standard(0x201, [1, 2]));
         assert_eq!((rpdo.poll_event(), rpdo.poll_event()), (data, None));
         rpdo.handle_frame(ms(0), &Frame::standard(0x201, [1, 2, 3]));
-        assert_eq!(rpdo.poll_event(), Some(RpdoEvent::TooLong(error)), "again after a good one");
+        assert_eq!(
+            rpdo.poll_event(),
+            Some(RpdoEvent::Fault(RpdoFault::TooLong(error))),
+            "again after a good one"
+        );
     }
 
     #[test]
@@ -207,7 +224,10 @@ mod tests {
         rpdo.handle_timeout(ms(1099));
         assert_eq!(rpdo.poll_event(), None);
         rpdo.handle_timeout(ms(1100));
-        assert_eq!((rpdo.poll_event(), rpdo.poll_timeout()), (Some(RpdoEvent::TimedOut), None));
+        assert_eq!(
+            (rpdo.poll_event(), rpdo.poll_timeout()),
+            (Some(RpdoEvent::Fault(RpdoFault::TimedOut)), None)
+        );
     }
 
     #[test]

@@ -79,8 +79,14 @@ impl Part {
 
     /// The part with this number, 0…3.
     #[must_use]
-    pub fn new(number: u8) -> Option<Self> {
-        Self::ALL.into_iter().find(|part| *part as u8 == number)
+    pub const fn new(number: u8) -> Option<Self> {
+        Some(match number {
+            0 => Self::Vendor,
+            1 => Self::Product,
+            2 => Self::Revision,
+            3 => Self::Serial,
+            _ => return None,
+        })
     }
 
     /// The one after it; after the last the first.

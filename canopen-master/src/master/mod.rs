@@ -185,7 +185,9 @@ impl<'d, B: Buffer, const N: usize> Master<'d, B, N> {
     pub fn new(config: Config) -> Self {
         Self {
             config,
-            nodes: core::array::from_fn(|index| Node::new(NodeId::new(index as u8 + 1).unwrap_or(Self::LAST))),
+            nodes: core::array::from_fn(|index| {
+                Node::new(NodeId::new(index as u8 + 1).unwrap_or(Self::LAST))
+            }),
             seen: NodeSet::EMPTY,
             guard_due: NodeSet::EMPTY,
             ask_due: NodeSet::EMPTY,

@@ -48,7 +48,8 @@ impl<'d, B: Buffer, const N: usize> Master<'d, B, N> {
     fn on_pdo(&mut self, number: usize, id: NodeId, data: &[u8]) {
         let node = self.nodes.get_mut(usize::from(id.raw()) - 1);
         let Some(image) = node.and_then(|node| node.inputs.get_mut(number)) else { return };
-        let (Some(new), Some(flag)) = (self.input_new.get_mut(number), self.input_flag.get_mut(number)) else {
+        let (Some(new), Some(flag)) = (self.input_new.get_mut(number), self.input_flag.get_mut(number))
+        else {
             return;
         };
         image.set(data);

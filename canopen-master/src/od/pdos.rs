@@ -5,11 +5,13 @@ use core::time::Duration;
 
 use pdo::mapping::{Entry as Mapped, MappingError};
 use pdo::{
-    Address, CobId, Communication, Frame, Handled, Mapping, Payload, Rpdo, RpdoEvent, Tpdo, Transmission, cob,
+    Address, CobId, Communication, Frame, Handled, Mapping, Payload, Rpdo, RpdoEvent, RpdoFault, Tpdo,
+    Transmission, cob,
 };
 
 use super::{Dictionary, Hooks};
 use crate::clock::earlier;
+use crate::data_type::DataType;
 use crate::sdo::{AbortCode, Access, Piece, Total, read_slice};
 
 /// One PDO: its parameters and its up to `M` mapped objects.
@@ -97,14 +99,12 @@ struct Parameter {
 
 impl Parameter {
     const fn of(at: Address) -> Option<Self> {
-        let (rpdo, mapping) = match at.index {
-            0x1400..=0x15FF => (true, false),
-            0x1600..=0x17FF => (true, true),
-            0x1800..=0x19FF => (false, false),
-            0x1A00..=0x1BFF => (false, true),
-            _ => return None,
-        };
-        Some(Self { rpdo, mapping, pdo: (at.index & 0x1FF) as usize, sub: at.sub })
+        // 1400h, 1600h, 1800h and 1A00h.
+        let (rpdo, mapping) = (at.index < 0x1800, at.index & 0x200 != 0);
+        match at.index {
+            0x1400..=0x1BFF => Some(Self { rpdo, mapping, pdo: (at.index & 0x1FF) as usize, sub: at.sub }),
+            _ => None,
+        }
     }
 }
 
@@ -123,17 +123,17 @@ trait Mappable {
 
 impl<H: Hooks> Mappable for Dictionary<'_, H> {
     fn check(&self, entry: Mapped, rpdo: bool) -> Result<(), AbortCode> {
-        if entry.is_dummy() {
-            let bits = crate::data_type::DataType(entry.at.index).size().map(|bytes| bytes * 8);
-            let fits =
-                entry.at.sub == 0 && (bits == Some(entry.bits) || (entry.at.index, entry.bits) == (1, 1));
-            return if rpdo && fits { Ok(()) } else { Err(AbortCode::NOT_MAPPABLE) };
-        }
-        let object = self.entry(entry.at).ok_or(AbortCode::NO_OBJECT)?;
-        let bits = object.data_type.size().map(|bytes| bytes * 8);
-        let boolean = object.data_type == crate::data_type::DataType::BOOLEAN && entry.bits == 1;
-        let fits = object.is_mappable(rpdo) && (bits == Some(entry.bits) || boolean);
-        if fits { Ok(()) } else { Err(AbortCode::NOT_MAPPABLE) }
+        let (data_type, mappable) = if entry.is_dummy() {
+            (DataType(entry.at.index), rpdo && entry.at.sub == 0)
+        } else {
+            let object = self.entry(entry.at).ok_or(AbortCode::NO_OBJECT)?;
+            (object.data_type, object.is_mappable(rpdo))
+        };
+        let fits = match entry.bits {
+            1 => data_type == DataType::BOOLEAN,
+            bits => data_type.size().is_some_and(|bytes| bytes * 8 == bits),
+        };
+        if mappable && fits { Ok(()) } else { Err(AbortCode::NOT_MAPPABLE) }
     }
 }
 
@@ -246,21 +246,25 @@ impl<const R: usize, const T: usize, const M: usize> Pdos<R, T, M> {
         tpdos.find_map(|(tpdo, slot)| tpdo.poll_transmit(now, || pack(slot, dictionary)))
     }
 
-    /// Writes what has come to the dictionary; tells the number (from 0) of the RPDO and what happened,
-    /// until `None`.
-    pub fn poll_event<H: Hooks>(&mut self, dictionary: &mut Dictionary<'_, H>) -> Option<(usize, RpdoEvent)> {
-        for (number, (rpdo, slot)) in self.rpdos.iter_mut().zip(&self.rpdo_slots).enumerate() {
-            let Some(event) = rpdo.poll_event() else { continue };
-            if let RpdoEvent::Data(payload) = event
-                && let Ok(values) = slot.mapping.unpack(payload)
-            {
+    /// Writes what has come to the dictionary; tells the number (from 0) of the RPDO whose data are there
+    /// now, or what was wrong, until `None`.
+    pub fn poll_event<H: Hooks>(
+        &mut self,
+        dictionary: &mut Dictionary<'_, H>,
+    ) -> Option<(usize, Result<(), RpdoFault>)> {
+        let mut rpdos = self.rpdos.iter_mut().zip(&self.rpdo_slots).enumerate();
+        let (number, slot, event) =
+            rpdos.find_map(|(number, (rpdo, slot))| Some((number, slot, rpdo.poll_event()?)))?;
+        match event {
+            RpdoEvent::Data(payload) => {
+                let values = slot.mapping.unpack(payload).into_iter().flatten();
                 values
                     .filter(|(entry, _)| !entry.is_dummy())
                     .for_each(|(entry, bits)| dictionary.set_bits(entry.at, bits.unsigned()));
+                Some((number, Ok(())))
             }
-            return Some((number, event));
+            RpdoEvent::Fault(fault) => Some((number, Err(fault))),
         }
-        None
     }
 
     /// A PDO begins anew, with its parameters as they are now.

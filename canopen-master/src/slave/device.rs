@@ -2,7 +2,7 @@
 
 use core::time::Duration;
 
-use pdo::{Frame, Handled, RpdoEvent};
+use pdo::{Frame, Handled, RpdoFault};
 
 use super::Objects;
 use crate::od::{self, Hooks};
@@ -35,7 +35,7 @@ impl<H: Hooks, const R: usize, const T: usize, const M: usize> Objects for Devic
         self.pdos.poll_transmit(now, &self.dictionary)
     }
 
-    fn poll_event(&mut self) -> Option<(usize, RpdoEvent)> {
+    fn poll_event(&mut self) -> Option<(usize, Result<(), RpdoFault>)> {
         self.pdos.poll_event(&mut self.dictionary)
     }
 

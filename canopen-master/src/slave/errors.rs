@@ -9,17 +9,22 @@ pub const EMERGENCIES: usize = 8;
 
 #[derive(Debug, Clone)]
 pub(super) struct Errors {
-    active: [Option<ErrorCode>; EMERGENCIES],
+    /// [`ErrorCode::NO_ERROR`] where there is room.
+    active: [ErrorCode; EMERGENCIES],
     producer: Producer<EMERGENCIES>,
 }
 
 impl Errors {
     pub(super) fn new() -> Self {
-        Self { active: [None; EMERGENCIES], producer: Producer::new(0) }
+        Self { active: [ErrorCode::NO_ERROR; EMERGENCIES], producer: Producer::new(0) }
     }
 
     pub(super) fn register(&self) -> u8 {
-        self.active.iter().flatten().fold(0, |register, code| register | code.register_bit())
+        self.active.iter().fold(0, |register, code| register | code.register_bit())
+    }
+
+    fn slot(&mut self, code: ErrorCode) -> Option<&mut ErrorCode> {
+        self.active.iter_mut().find(|slot| **slot == code)
     }
 
     pub(super) const fn producer(&mut self) -> &mut Producer<EMERGENCIES> {
@@ -36,13 +41,10 @@ impl Errors {
     }
 
     pub(super) fn raise(&mut self, code: ErrorCode, data: [u8; 5]) -> Result<(), ProducerFull> {
-        if self.active.contains(&Some(code)) {
+        if self.active.contains(&code) {
             return Ok(());
         }
-        let Some(slot) = self.active.iter_mut().find(|slot| slot.is_none()) else {
-            return Err(ProducerFull(EMERGENCIES));
-        };
-        *slot = Some(code);
+        *self.slot(ErrorCode::NO_ERROR).ok_or(ProducerFull(EMERGENCIES))? = code;
         let register = self.register();
         self.producer.push(Emergency { code, register, data })
     }
@@ -55,8 +57,8 @@ impl Errors {
     }
 
     pub(super) fn clear(&mut self, code: ErrorCode) -> Result<(), ProducerFull> {
-        let Some(slot) = self.active.iter_mut().find(|slot| **slot == Some(code)) else { return Ok(()) };
-        *slot = None;
+        let Some(slot) = self.slot(code) else { return Ok(()) };
+        *slot = ErrorCode::NO_ERROR;
         let register = self.register();
         self.producer.push(Emergency { code: ErrorCode::NO_ERROR, register, data: [0; 5] })
     }

@@ -63,9 +63,12 @@ impl<D: Access> Access for View<'_, D> {
     }
 }
 
-/// A number of up to 4 bytes; `None` where the dictionary does not have the object.
-pub(super) fn number(dictionary: &mut impl Access, index: u16, sub: u8) -> Option<u32> {
+/// A number of up to 4 bytes, or what it is where the dictionary does not have the object.
+#[cfg_attr(target_pointer_width = "32", inline(never))]
+pub(super) fn number(dictionary: &mut impl Access, index: u16, sub: u8, absent: u32) -> u32 {
     let mut bytes = [0; 4];
-    dictionary.read(Address::new(index, sub), 0, &mut bytes).ok()?;
-    Some(u32::from_le_bytes(bytes))
+    match dictionary.read(Address::new(index, sub), 0, &mut bytes) {
+        Ok(_) => u32::from_le_bytes(bytes),
+        Err(_) => absent,
+    }
 }

@@ -2,7 +2,7 @@
 
 use core::time::Duration;
 
-use pdo::{Frame, Handled, RpdoEvent};
+use pdo::{Frame, Handled, RpdoFault};
 
 use crate::sdo::Access;
 
@@ -40,7 +40,7 @@ pub trait Objects: Access {
     }
 
     /// Writes what RPDOs brought to the dictionary; tells which (from 0) and what, until `None`.
-    fn poll_event(&mut self) -> Option<(usize, RpdoEvent)> {
+    fn poll_event(&mut self) -> Option<(usize, Result<(), RpdoFault>)> {
         None
     }
 
