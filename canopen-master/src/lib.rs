@@ -9,7 +9,6 @@ extern crate std;
 
 pub mod boot;
 mod bus;
-mod clock;
 pub mod data_type;
 pub mod ds401;
 pub mod ds402;
@@ -36,3 +35,5 @@ pub mod trace;
 pub use bus::BusStatus;
 pub use node_set::NodeSet;
 pub use pdo::{Address, Frame, Handled, NodeId};
+
+use pdo::clock;

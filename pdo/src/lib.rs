@@ -6,6 +6,7 @@
 extern crate std;
 
 mod address;
+pub mod clock;
 pub mod cob;
 mod communication;
 mod frame;

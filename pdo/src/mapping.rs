@@ -148,20 +148,29 @@ impl<const N: usize> Mapping<N> {
     /// [`MappingError`] where it does not fit; nothing is changed then.
     pub const fn push(&mut self, object: Entry) -> Result<(), MappingError> {
         let number = self.len.saturating_add(1);
-        if object.bits == 0 {
-            return Err(MappingError::NoBits { entry: number, object });
-        }
-        let end = self.bits as u16 + object.bits as u16;
-        if end > MAX_BITS as u16 {
-            return Err(MappingError::TooLong { entry: number, object, end });
-        }
+        let end = match Self::end(number, self.bits, object) {
+            Ok(end) => end,
+            Err(error) => return Err(error),
+        };
         let (_, room) =
             self.entries.split_at_mut(if (self.len as usize) < N { self.len as usize } else { N });
         let [slot, ..] = room else { return Err(MappingError::TooMany(N)) };
         *slot = object;
         self.len = number;
-        self.bits = end as u8;
+        self.bits = end;
         Ok(())
+    }
+
+    /// Where entry `number` ends that begins at bit `begin`.
+    const fn end(number: u8, begin: u8, object: Entry) -> Result<u8, MappingError> {
+        if object.bits == 0 {
+            return Err(MappingError::NoBits { entry: number, object });
+        }
+        let end = begin as u16 + object.bits as u16;
+        if end > MAX_BITS as u16 {
+            return Err(MappingError::TooLong { entry: number, object, end });
+        }
+        Ok(end as u8)
     }
 
     /// Nothing is mapped any more; the entries can be [`set`](Self::set) anew.
@@ -188,16 +197,16 @@ impl<const N: usize> Mapping<N> {
     /// # Errors
     /// [`MappingError`] where they do not fit; nothing is changed then.
     pub fn enable(&mut self, count: u8) -> Result<(), MappingError> {
-        let before = (self.len, self.bits);
-        self.disable();
-        let enabled = (1..=count).try_for_each(|number| {
-            let object = self.entry(number).ok_or(MappingError::TooMany(N))?;
-            self.push(object)
-        });
-        if enabled.is_err() {
-            (self.len, self.bits) = before;
+        let mut end = 0;
+        for (number, &object) in (1..=count).zip(&self.entries) {
+            end = Self::end(number, end, object)?;
         }
-        enabled
+        if usize::from(count) > N {
+            return Err(MappingError::TooMany(N));
+        }
+        self.len = count;
+        self.bits = end;
+        Ok(())
     }
 
     /// The entries.

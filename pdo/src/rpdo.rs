@@ -2,6 +2,7 @@
 
 use core::time::Duration;
 
+use crate::clock::{after, is_due};
 use crate::mapping::LengthError;
 use crate::{Communication, Handled, Payload};
 
@@ -104,13 +105,10 @@ impl Rpdo {
             self.was_too_long = false;
         }
         if !self.timeout.is_zero() {
-            self.deadline = Some(now.saturating_add(self.timeout));
+            self.deadline = Some(after(now, self.timeout));
         }
-        if self.synchronous {
-            self.waiting = Some(payload);
-        } else {
-            self.ready = Some(payload);
-        }
+        let slot = if self.synchronous { &mut self.waiting } else { &mut self.ready };
+        *slot = Some(payload);
     }
 
     /// A SYNC has come: what was received before takes effect.
@@ -123,7 +121,7 @@ impl Rpdo {
 
     /// Notices a missing PDO; early calls do nothing.
     pub fn handle_timeout(&mut self, now: Duration) {
-        if self.deadline.is_some_and(|deadline| now >= deadline) {
+        if is_due(self.deadline, now) {
             self.deadline = None;
             self.fault = Some(RpdoFault::TimedOut);
         }

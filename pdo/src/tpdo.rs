@@ -4,6 +4,7 @@ use core::time::Duration;
 
 use embedded_can::{Id, StandardId};
 
+use crate::clock::{after, after_ms, is_due};
 use crate::{Communication, Frame, Handled, Payload, Transmission};
 
 /// A sent PDO.
@@ -106,7 +107,7 @@ impl Tpdo {
     /// Notices that the event timer ran out; early calls do nothing.
     #[inline]
     pub fn handle_timeout(&mut self, now: Duration) {
-        if self.event.is_some_and(|event| now >= event) {
+        if is_due(self.event, now) {
             self.event = None;
             self.pending = true;
         }
@@ -139,14 +140,13 @@ impl Tpdo {
             },
             Transmission::RtrEvent => asked.then(data)?,
             Transmission::EventManufacturer | Transmission::EventProfile => {
-                if !asked && (!self.pending || now < self.free) {
+                if !asked && !(self.pending && is_due(Some(self.free), now)) {
                     return None;
                 }
                 self.pending = false;
                 let Communication { inhibit, event_timer, .. } = self.communication;
-                self.free = now.saturating_add(Duration::from_micros(u64::from(inhibit) * 100));
-                let timer = Duration::from_millis(event_timer.into());
-                self.event = (event_timer != 0).then(|| now.saturating_add(timer));
+                self.free = after(now, Duration::from_micros(u64::from(inhibit) * 100));
+                self.event = (event_timer != 0).then(|| after_ms(now, event_timer.into()));
                 data()
             }
         };

@@ -274,8 +274,8 @@ fn check_limits(entry: &Entry<'_>, value: &[u8]) -> Result<(), AbortCode> {
     let Some(limits) = entry.limits else { return Ok(()) };
     let bits = value.iter().rev().fold(0u64, |bits, &byte| bits << 8 | u64::from(byte));
     let number = match entry.data_type.kind() {
-        Kind::Signed(bytes) => {
-            let unused = 64 - 8 * u32::from(bytes.clamp(1, 8));
+        Kind::Signed(_) => {
+            let unused = 64 - 8 * value.len().clamp(1, 8);
             (bits << unused) as i64 >> unused
         }
         // Beyond what limits can say is too high for any.

@@ -114,9 +114,9 @@ impl<'a> View<'a> {
     /// Position of an entry; `Err` tells whether others of its index exist.
     pub(super) fn find(&self, at: Address) -> Result<usize, bool> {
         self.entries.binary_search_by_key(&key(at), |entry| key(entry.at)).map_err(|place| {
-            let neighbours = [place.checked_sub(1), Some(place)];
-            let mut others = neighbours.into_iter().flatten().filter_map(|place| self.entries.get(place));
-            others.any(|other| other.at.index == at.index)
+            let other =
+                |place: usize| self.entries.get(place).is_some_and(|entry| entry.at.index == at.index);
+            other(place) || other(place.wrapping_sub(1))
         })
     }
 }
