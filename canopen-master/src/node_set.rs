@@ -50,11 +50,15 @@ impl NodeSet {
     }
 
     /// Puts a node in.
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    #[cfg_attr(not(target_pointer_width = "32"), inline)]
     pub const fn insert(&mut self, node: NodeId) {
         self.0[Self::word(node)] |= Self::bit(node);
     }
 
     /// Takes a node out; whether it was in.
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    #[cfg_attr(not(target_pointer_width = "32"), inline)]
     pub const fn remove(&mut self, node: NodeId) -> bool {
         let was = self.contains(node);
         self.0[Self::word(node)] &= !Self::bit(node);

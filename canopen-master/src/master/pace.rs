@@ -20,6 +20,10 @@ const fn longest(bytes: usize) -> u32 {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Pace {
     bit: Duration,
+    /// A frame of 8 bytes.
+    frame: Duration,
+    /// As many as may wait.
+    ahead: Duration,
     /// When all that was handed out is sent.
     sent: Duration,
 }
@@ -27,18 +31,25 @@ pub(super) struct Pace {
 impl Pace {
     pub(super) const fn new(bit_rate: u32) -> Self {
         let rate = if bit_rate == 0 { 1 } else { bit_rate };
-        Self { bit: Duration::from_nanos(1_000_000_000_u64.div_ceil(rate as u64)), sent: Duration::ZERO }
+        let bit = 1_000_000_000_u64.div_ceil(rate as u64);
+        let frame = bit * longest(8) as u64;
+        Self {
+            bit: Duration::from_nanos(bit),
+            frame: Duration::from_nanos(frame),
+            ahead: Duration::from_nanos(frame * WAITING as u64),
+            sent: Duration::ZERO,
+        }
     }
 
     /// A frame was handed out.
     #[inline]
     pub(super) fn hand_out(&mut self, now: Duration) {
-        self.sent = after(self.sent.max(now), self.bit * longest(8));
+        self.sent = after(self.sent.max(now), self.frame);
     }
 
     /// It was not taken.
     pub(super) fn take_back(&mut self) {
-        self.sent = self.sent.saturating_sub(self.bit * longest(8));
+        self.sent = self.sent.saturating_sub(self.frame);
     }
 
     /// A frame of another station has gone over the wire; ours waited meanwhile.
@@ -52,7 +63,7 @@ impl Pace {
 
     /// When one more frame may be handed out.
     pub(super) fn opens(&self) -> Duration {
-        self.sent.saturating_sub(self.bit * (longest(8) * WAITING))
+        self.sent.saturating_sub(self.ahead)
     }
 }
 

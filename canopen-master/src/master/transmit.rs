@@ -8,6 +8,7 @@ use pdo::{Frame, Service};
 use super::Master;
 use super::event::Notice;
 use super::node::Job;
+use crate::clock::is_due;
 use crate::guarding;
 use crate::nmt::{Command, Target};
 use crate::node_set::NodeSet;
@@ -43,7 +44,7 @@ impl<B: Buffer, const N: usize> Master<'_, B, N> {
         }
         let mut held = NodeSet::EMPTY;
         if self.scan.is_some() || !self.paced.is_empty() {
-            if now >= self.pace.opens() {
+            if is_due(Some(self.pace.opens()), now) {
                 self.start_scan();
             } else {
                 held = self.paced;
