@@ -140,7 +140,8 @@ impl Tpdo {
             },
             Transmission::RtrEvent => asked.then(data)?,
             Transmission::EventManufacturer | Transmission::EventProfile => {
-                if !asked && !(self.pending && is_due(Some(self.free), now)) {
+                let due = self.pending && is_due(Some(self.free), now);
+                if !(asked || due) {
                     return None;
                 }
                 self.pending = false;
