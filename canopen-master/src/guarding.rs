@@ -85,6 +85,8 @@ pub struct Guard {
     toggle: Option<bool>,
     /// Whether a request waits for its answer.
     asked: bool,
+    /// A request had no answer: if the answer was lost the toggle goes on, if the request was, it does not.
+    missed: bool,
     lost: bool,
     toggle_told: bool,
 }
@@ -93,7 +95,16 @@ impl Guard {
     /// Starts guarding; the first request is due at once.
     #[must_use]
     pub const fn new(config: Config, now: Duration) -> Self {
-        Self { config, next: now, last: now, toggle: None, asked: false, lost: false, toggle_told: false }
+        Self {
+            config,
+            next: now,
+            last: now,
+            toggle: None,
+            asked: false,
+            missed: false,
+            lost: false,
+            toggle_told: false,
+        }
     }
 
     /// How it guards.
@@ -123,7 +134,7 @@ impl Guard {
         }
         let due = is_due(Some(self.next), now);
         if due {
-            self.asked = true;
+            self.missed |= core::mem::replace(&mut self.asked, true);
             self.next = clock::next(self.next, self.config.period(), now);
         }
         (due, event)
@@ -141,8 +152,10 @@ impl Guard {
     pub fn handle_answer(&mut self, now: Duration, byte: u8) -> Option<Event> {
         let toggle = byte & 0x80 != 0;
         self.asked = false;
+        let missed = core::mem::take(&mut self.missed);
         if let Some(expected) = self.toggle
             && expected != toggle
+            && !missed
         {
             return (!core::mem::replace(&mut self.toggle_told, true)).then_some(Event::Toggle { expected });
         }
@@ -164,6 +177,7 @@ impl Guard {
         self.last = now;
         self.next = now;
         self.asked = false;
+        self.missed = true;
     }
 
     fn alive(&mut self, now: Duration) -> Option<Event> {
@@ -289,15 +303,18 @@ mod tests {
     }
 
     #[test]
-    fn after_a_lost_answer_the_next_but_one_is_good() {
+    fn after_a_lost_answer_or_request_the_next_one_is_good() {
         let mut guard = Guard::new(Config::default(), ms(0));
         guard.handle_timeout(ms(0));
         assert_eq!(guard.handle_answer(ms(1), 0x05), None);
         guard.handle_timeout(ms(100)); // 85h is lost on the way
         guard.handle_timeout(ms(200));
-        assert_eq!(guard.handle_answer(ms(201), 0x05), Some(Event::Toggle { expected: true }));
-        guard.handle_timeout(ms(300));
-        assert_eq!(guard.handle_answer(ms(300), 0x85), None);
+        assert_eq!(guard.handle_answer(ms(201), 0x05), None);
+        guard.handle_timeout(ms(300)); // the request is lost on the way
+        guard.handle_timeout(ms(400));
+        assert_eq!(guard.handle_answer(ms(401), 0x85), None);
+        guard.handle_timeout(ms(500));
+        assert_eq!(guard.handle_answer(ms(501), 0x85), Some(Event::Toggle { expected: false }));
     }
 
     #[test]

@@ -79,6 +79,8 @@ pub struct Axis {
     powered: bool,
     held: bool,
     error: MotionError,
+    /// What failed of the drive.
+    drive: Option<Failure>,
     /// Limit switches reached: upper, lower.
     limits: [Option<Failure>; 2],
     /// Actual position of this cycle.
@@ -106,6 +108,7 @@ impl Default for Axis {
             powered: false,
             held: false,
             error: MotionError::NONE,
+            drive: None,
             limits: [None; 2],
             actual: 0,
             set: 0.0,
@@ -141,9 +144,10 @@ impl AxisControl for Axis {
         let mut output = AxisOutput::default();
         self.measure(input);
         self.power(input, &mut output);
+        self.watch_drive(input.failure, &mut output);
         if self.powered {
             self.watch(input, &mut output);
-            if input.reset {
+            if input.reset && input.failure.is_none() && input.actual.real {
                 self.acknowledge();
             }
             if let Some(stop) = input.stop {

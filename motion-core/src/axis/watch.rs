@@ -9,6 +9,13 @@ use crate::control::{AxisInput, AxisOutput, PlcStop};
 use crate::failure::{HW_LIMIT_MINUS, HW_LIMIT_PLUS, SW_LIMIT_MINUS, SW_LIMIT_PLUS};
 
 impl Axis {
+    /// Tells a failure of the drive once, also of an axis that is not enabled.
+    pub(super) fn watch_drive(&mut self, failure: Option<Failure>, output: &mut AxisOutput) {
+        if core::mem::replace(&mut self.drive, failure) != failure {
+            output.failure = failure;
+        }
+    }
+
     /// Failures of drive and input, following error, limit switches: all in the cycle in which they come.
     pub(super) fn watch(&mut self, input: &AxisInput, output: &mut AxisOutput) {
         if let Some(failure) = input.failure.or(input.actual.failure) {
@@ -16,7 +23,6 @@ impl Axis {
             if self.motion != Motion::Failed || self.error != error {
                 self.controlled = false;
                 self.fail(error, output);
-                output.failure = input.failure;
             }
             return;
         }

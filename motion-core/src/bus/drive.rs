@@ -2,7 +2,7 @@
 
 use core::time::Duration;
 
-use canopen_master::ds402::{self, Goal, State, StatusWord};
+use canopen_master::ds402::{self, Goal, Outcome, State, StatusWord};
 use lb2::code::Failure;
 use pdo::Payload;
 use pdo::layout::ld2000::{Command, Feedback};
@@ -21,11 +21,19 @@ pub(super) struct Drive {
     control: ds402::Axis,
     enable: bool,
     feedback: Option<(Duration, Feedback)>,
+    /// Guarding has lost it, or the bus is away.
     lost: bool,
+    /// It is in another operating mode than digital speed.
+    wrong_mode: bool,
     /// To be told to the axis with the next cycle.
     failure: Option<Failure>,
     faulty: bool,
+    /// A warning is to be cleared: a drive that has missed its master does not move before.
+    clear: bool,
 }
+
+/// Bit of the control word that clears warnings of an LD 2000.
+const CLEAR_WARNING: u16 = 1 << 11;
 
 impl Drive {
     /// Takes an actual value.
@@ -39,6 +47,19 @@ impl Drive {
             self.failure = Some(failure::DRIVE_FAULT);
         }
         self.faulty = faulty;
+        self.clear &= status.has(StatusWord::WARNING);
+    }
+
+    /// It starts anew: a scan resets what it finds.
+    pub(super) fn restart(&mut self) {
+        self.wrong_mode = false;
+        self.forget();
+    }
+
+    /// What it showed last counts no more, nor what was asked of it.
+    fn forget(&mut self) {
+        (self.enable, self.faulty) = (false, false);
+        self.control = ds402::Axis::default();
     }
 
     /// The position now, 24 bits: SYNC is slower than the control cycle, so between two actual values it
@@ -53,21 +74,26 @@ impl Drive {
         Some(feedback.position.wrapping_add(moved as u32) & 0xFF_FFFF)
     }
 
-    /// What failed since the last cycle; a lost drive fails as long as it is lost.
+    /// What failed since the last cycle; a drive that is lost, or in a wrong mode, fails as long as it is.
     pub(super) fn take_failure(&mut self) -> Option<Failure> {
-        self.failure.take()
+        let lasting = if self.lost {
+            Some(failure::DRIVE_LOST)
+        } else {
+            self.wrong_mode.then_some(failure::DRIVE_MODE)
+        };
+        let once = self.failure.take();
+        lasting.or(once)
     }
 
-    /// Guarding says that the drive is lost, or is back.
+    /// The drive is lost, or is back.
     pub(super) fn set_lost(&mut self, lost: bool) {
         if lost && !self.lost {
+            // What comes back may be another drive, or the same after a loss of power; and be it back
+            // before the next cycle, it has been away.
+            self.forget();
             self.failure = Some(failure::DRIVE_LOST);
         }
         self.lost = lost;
-        if lost {
-            // What comes back may be another drive, or the same after a loss of power.
-            self.enable = false;
-        }
     }
 
     /// The drive says by an emergency that it has a fault.
@@ -79,13 +105,22 @@ impl Drive {
 
     /// The scan found it in another operating mode than digital speed.
     pub(super) const fn wrong_mode(&mut self) {
-        self.failure = Some(failure::DRIVE_MODE);
+        self.wrong_mode = true;
     }
 
     /// What goes out in this cycle.
     pub(super) fn command(&mut self, now: Duration, wanted: &DriveSetpoint) -> Payload {
-        while self.control.poll_event().is_some() {}
         self.control.handle_timeout(now);
+        while let Some(event) = self.control.poll_event() {
+            // A fault that a reset did not end is one still.
+            if let ds402::Event::Outcome(_, Outcome::Fault | Outcome::TimedOut(Some(State::Fault))) = event
+                && self.faulty
+            {
+                self.failure = Some(failure::DRIVE_FAULT);
+            }
+        }
+        let warns = self.control.status().is_some_and(|status| status.has(StatusWord::WARNING));
+        self.clear |= wanted.reset && warns;
         let enable = wanted.enable && !self.lost;
         let goal = if wanted.reset && self.faulty {
             Some(Goal::ResetFault)
@@ -103,6 +138,7 @@ impl Drive {
             let _ = self.control.go(now, goal);
         }
         let speed = if self.enable { wanted.speed } else { 0 };
-        Command { control_word: self.control.poll_control().0, speed }.encode()
+        let clear = if self.clear { CLEAR_WARNING } else { 0 };
+        Command { control_word: self.control.poll_control().0 | clear, speed }.encode()
     }
 }

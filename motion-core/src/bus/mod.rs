@@ -34,9 +34,16 @@ use drive::Drive;
 pub const NODES: usize = 16;
 
 /// What a drive is told at boot, as a concise DCF: 2600h:00 = 22 and 2A00h:00 = 22, so that its PDO 1
-/// in both directions is number 22 (decision 14).
-const DRIVE_DCF: [u8; 20] =
-    [2, 0, 0, 0, 0x00, 0x26, 0x00, 1, 0, 0, 0, DEFAULT_RPDO, 0x00, 0x2A, 0x00, 1, 0, 0, 0, DEFAULT_TPDO];
+/// in both directions is number 22 (decision 14); guard time 100Ch and life time factor 100Dh as the
+/// controller guards, so that a drive which does not hear it any more stops (project-defined).
+#[rustfmt::skip]
+const DRIVE_DCF: [u8; 37] = [
+    4, 0, 0, 0,
+    0x0C, 0x10, 0x00, 2, 0, 0, 0, guarding::PERIOD.as_millis() as u8, 0,
+    0x0D, 0x10, 0x00, 1, 0, 0, 0, guarding::LIFE_TIME_FACTOR,
+    0x00, 0x26, 0x00, 1, 0, 0, 0, DEFAULT_RPDO,
+    0x00, 0x2A, 0x00, 1, 0, 0, 0, DEFAULT_TPDO,
+];
 
 /// How a drive boots.
 static DRIVE_BOOT: boot::Config<'static> = boot_config(match ConciseDcf::new(&DRIVE_DCF) {
@@ -413,16 +420,29 @@ impl CanBus {
             Event::Booted { node, result } => match result {
                 Ok(_) => {
                     self.ready.insert(node);
-                    self.set_lost(node, false);
+                    if let Some(drive) = self.drive_mut(node) {
+                        // It still sent what it was during the scan.
+                        drive.restart();
+                        drive.set_lost(false);
+                    }
                 }
                 Err(_) => self.set_lost(node, true),
             },
             Event::Guarding { node, event: guarding::Event::Lost } => self.set_lost(node, true),
-            Event::Guarding { node, event: guarding::Event::Back } => self.set_lost(node, false),
+            // What has not booted since is not what it was.
+            Event::Guarding { node, event: guarding::Event::Back } if self.ready.contains(node) => {
+                self.follow_state(now, node);
+            }
             Event::Emergency { node, emergency } if is_fault(&emergency) => {
                 if let Some(drive) = self.drive_mut(node) {
                     drive.emergency();
                 }
+            }
+            Event::Bus(status) => self.bus_changed(status),
+            Event::State { node, .. } if self.ready.contains(node) => self.follow_state(now, node),
+            Event::Nmt { missing, .. } => {
+                let again = missing.and(self.ready).without(self.guarding_lost());
+                again.iter().for_each(|node| self.start_node(now, node));
             }
             // A node that has started anew is not what it was: it takes a scan (4.3.4.4).
             Event::BootUp(node) if self.ready.contains(node) => {
@@ -431,6 +451,38 @@ impl CanBus {
             }
             _ => {}
         }
+    }
+
+    /// Without a bus every drive is lost at once; when it is back, guarding tells who is not there.
+    fn bus_changed(&mut self, status: BusStatus) {
+        let lost = if status.is_on() { self.guarding_lost() } else { self.ready };
+        for node in self.ready.iter() {
+            self.set_lost(node, lost.contains(node));
+        }
+    }
+
+    fn guarding_lost(&self) -> NodeSet {
+        match &self.engine {
+            Engine::Master(master) => master.lost(),
+            Engine::Slave(_) | Engine::Link(_) => NodeSet::EMPTY,
+        }
+    }
+
+    /// A drive that missed its master takes no set values until it is started again.
+    fn follow_state(&mut self, now: Duration, node: NodeId) {
+        let Engine::Master(master) = &self.engine else { return };
+        let operational = master.state(node) == Some(nmt::State::Operational);
+        self.set_lost(node, !operational);
+        if !operational {
+            self.start_node(now, node);
+        }
+    }
+
+    fn start_node(&mut self, now: Duration, node: NodeId) {
+        let Engine::Master(master) = &mut self.engine else { return };
+        // A bus has at most 8 nodes with objects, and as many commands find a place. Off the bus, the
+        // node shows its state when the bus is back.
+        let _ = master.nmt(now, nmt::Command::Start, nmt::Target::Node(node));
     }
 
     fn set_lost(&mut self, node: NodeId, lost: bool) {
