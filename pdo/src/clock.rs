@@ -44,6 +44,14 @@ pub fn after(now: Duration, time: Duration) -> Duration {
     now.saturating_add(time)
 }
 
+/// `time` before `now`, zero at the earliest.
+#[must_use]
+#[cfg_attr(target_pointer_width = "32", inline(never))]
+#[cfg_attr(not(target_pointer_width = "32"), inline)]
+pub fn before(now: Duration, time: Duration) -> Duration {
+    now.saturating_sub(time)
+}
+
 /// The next moment of a grid after one that has come; those that were missed are not made up for.
 #[must_use]
 pub fn next(last: Duration, period: Duration, now: Duration) -> Duration {

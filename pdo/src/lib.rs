@@ -27,6 +27,6 @@ pub use handled::Handled;
 pub use mapping::Mapping;
 pub use node::{NodeId, NodeIdError};
 pub use payload::{Bits, Payload};
-pub use rpdo::{Rpdo, RpdoEvent, RpdoFault};
+pub use rpdo::{LengthCheck, Rpdo, RpdoEvent, RpdoFault};
 pub use tpdo::Tpdo;
 pub use transmission::{Transmission, TransmissionError};

@@ -31,6 +31,52 @@ pub enum RpdoFault {
     TimedOut,
 }
 
+/// Holds the length of what is received against that of the mapping.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LengthCheck {
+    expected: u8,
+    was_too_long: bool,
+}
+
+impl LengthCheck {
+    /// So many bytes are mapped, 0…8.
+    #[must_use]
+    pub const fn new(expected: u8) -> Self {
+        Self { expected, was_too_long: false }
+    }
+
+    /// Bytes that are mapped.
+    #[must_use]
+    pub const fn expected(self) -> u8 {
+        self.expected
+    }
+
+    /// A PDO has come.
+    ///
+    /// # Errors
+    /// [`RpdoFault::TooShort`]: it must not be processed. [`RpdoFault::TooLong`]: it is processed as far as
+    /// mapped; told once, until one of the right length has come.
+    #[inline]
+    pub const fn check(&mut self, found: u8) -> Result<(), RpdoFault> {
+        if found == self.expected {
+            self.was_too_long = false;
+            return Ok(());
+        }
+        self.judge(found)
+    }
+
+    #[cold]
+    const fn judge(&mut self, found: u8) -> Result<(), RpdoFault> {
+        let error = LengthError { expected: self.expected, found };
+        if found < self.expected {
+            return Err(RpdoFault::TooShort(error));
+        }
+        let told = self.was_too_long;
+        self.was_too_long = true;
+        if told { Ok(()) } else { Err(RpdoFault::TooLong(error)) }
+    }
+}
+
 /// A received PDO.
 ///
 /// - Input: [`handle_frame`](Self::handle_frame), [`handle_sync`](Self::handle_sync),
@@ -44,13 +90,12 @@ pub struct Rpdo {
     /// [`NONE`] where it does not exist.
     id: u16,
     synchronous: bool,
-    bytes: u8,
+    length: LengthCheck,
     /// Zero: any.
     timeout: Duration,
     waiting: Option<Payload>,
     ready: Option<Payload>,
     fault: Option<RpdoFault>,
-    was_too_long: bool,
     deadline: Option<Duration>,
 }
 
@@ -67,12 +112,11 @@ impl Rpdo {
                 None => NONE,
             },
             synchronous: communication.transmission.is_synchronous(),
-            bytes,
+            length: LengthCheck::new(bytes),
             timeout: Duration::from_millis(communication.event_timer as u64),
             waiting: None,
             ready: None,
             fault: None,
-            was_too_long: false,
             deadline: None,
         }
     }
@@ -90,19 +134,14 @@ impl Rpdo {
 
     #[inline]
     fn receive(&mut self, now: Duration, mut payload: Payload) {
-        let expected = self.bytes;
-        if payload.len() != expected {
-            let error = LengthError { expected, found: payload.len() };
-            if payload.len() < expected {
-                self.fault = Some(RpdoFault::TooShort(error));
+        if let Err(fault) = self.length.check(payload.len()) {
+            self.fault = Some(fault);
+            if matches!(fault, RpdoFault::TooShort(_)) {
                 return;
             }
-            if !core::mem::replace(&mut self.was_too_long, true) {
-                self.fault = Some(RpdoFault::TooLong(error));
-            }
-            payload = Payload::new(payload.word(), expected);
-        } else {
-            self.was_too_long = false;
+        }
+        if payload.len() > self.length.expected() {
+            payload = Payload::new(payload.word(), self.length.expected());
         }
         if !self.timeout.is_zero() {
             self.deadline = Some(after(now, self.timeout));

@@ -3,7 +3,7 @@
 use core::time::Duration;
 
 use pdo::cob::DefaultPdo;
-use pdo::{Address, Frame, NodeId};
+use pdo::{Address, Frame, LengthCheck, NodeId};
 
 use super::node::{Data, Job};
 use super::{Master, NMT_COMMANDS, NmtJob, NmtTicket, QUEUE, Refused, ScanJob, SubmitError};
@@ -184,6 +184,29 @@ impl<'d, B: Buffer, const N: usize> Master<'d, B, N> {
     #[must_use]
     pub fn progress(&self, node: NodeId) -> Option<(u32, Option<u32>)> {
         self.node(node).filter(|_| self.sdo_busy.contains(node)).map(|node| node.sdo.progress())
+    }
+
+    /// TPDO 1…4 of a node has so many bytes, 0…8: as many as its mapping. One that is too short is not
+    /// taken, one that is too long as far as it is mapped; [`Event::Pdo`](super::Event::Pdo) tells of
+    /// both. `None`: any length, as it is until this is called.
+    ///
+    /// # Errors
+    /// [`SubmitError::Length`], [`SubmitError::Node`].
+    pub fn expect_pdo(
+        &mut self,
+        node: NodeId,
+        number: DefaultPdo,
+        bytes: Option<u8>,
+    ) -> Result<(), SubmitError> {
+        if let Some(bytes) = bytes.filter(|&bytes| bytes > 8) {
+            return Err(SubmitError::Length(bytes.into()));
+        }
+        self.check(node)?;
+        let lengths = self.node_mut(node).map(|node| &mut node.lengths);
+        if let Some(length) = lengths.and_then(|lengths| lengths.get_mut(number as usize - 1)) {
+            *length = bytes.map(LengthCheck::new);
+        }
+        Ok(())
     }
 
     /// Sets the data of RPDO 1…4 of a node, to be sent as soon as the bus allows; returns whether

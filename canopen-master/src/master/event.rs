@@ -1,6 +1,6 @@
 //! What the master tells, and what it does not take.
 
-use pdo::NodeId;
+use pdo::{DefaultPdo, NodeId, RpdoFault};
 
 use super::NmtTicket;
 use crate::boot::{Booted, Failure};
@@ -43,6 +43,15 @@ pub enum Event<B> {
         node: NodeId,
         /// What it says.
         emergency: Emergency,
+    },
+    /// A TPDO of another length than [`Master::expect_pdo`](super::Master::expect_pdo) was told.
+    Pdo {
+        /// Who sent it.
+        node: NodeId,
+        /// Which.
+        number: DefaultPdo,
+        /// What is wrong, and whether it was taken all the same.
+        fault: RpdoFault,
     },
     /// The one outcome of an NMT command.
     Nmt {
@@ -101,6 +110,7 @@ pub(super) enum Notice {
     Guarding(NodeId, guarding::Event),
     Heartbeat(NodeId, heartbeat::Event),
     Emergency(NodeId, Emergency),
+    Pdo(NodeId, DefaultPdo, RpdoFault),
     Bus(BusStatus),
     TransmitFull,
     Discarded(u32),
@@ -114,6 +124,7 @@ impl<B> From<Notice> for Event<B> {
             Notice::Guarding(node, event) => Self::Guarding { node, event },
             Notice::Heartbeat(node, event) => Self::Heartbeat { node, event },
             Notice::Emergency(node, emergency) => Self::Emergency { node, emergency },
+            Notice::Pdo(node, number, fault) => Self::Pdo { node, number, fault },
             Notice::Bus(status) => Self::Bus(status),
             Notice::TransmitFull => Self::TransmitFull,
             Notice::Discarded(frames) => Self::Discarded(frames),

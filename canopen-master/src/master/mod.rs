@@ -102,7 +102,8 @@ impl ScanJob {
 ///
 /// - Commands: [`nmt`](Self::nmt), [`set_guarding`](Self::set_guarding),
 ///   [`set_heartbeat`](Self::set_heartbeat), [`set_sync`](Self::set_sync), [`upload`](Self::upload),
-///   [`download`](Self::download), [`cancel`](Self::cancel), [`write_pdo`](Self::write_pdo),
+///   [`download`](Self::download), [`cancel`](Self::cancel), [`expect_pdo`](Self::expect_pdo),
+///   [`write_pdo`](Self::write_pdo),
 ///   [`boot`](Self::boot), [`scan`](Self::scan), [`lss`](Self::lss), [`send`](Self::send).
 /// - Input: [`handle_frame`](Self::handle_frame), [`handle_timeout`](Self::handle_timeout), and from
 ///   the adapter [`handle_bus`](Self::handle_bus), [`handle_refused`](Self::handle_refused),

@@ -2,7 +2,7 @@
 
 use core::time::Duration;
 
-use pdo::NodeId;
+use pdo::{LengthCheck, NodeId};
 
 use crate::boot::{Booted, Failure, Process};
 use crate::clock::earliest;
@@ -115,6 +115,8 @@ pub(super) struct Node<'d, B> {
     pub(super) ticket: Option<Ticket>,
     pub(super) info: Option<Info>,
     pub(super) inputs: [Image; 4],
+    /// `None`: any length.
+    pub(super) lengths: [Option<LengthCheck>; 4],
     pub(super) outputs: [Image; 4],
 }
 
@@ -130,6 +132,7 @@ impl<B: Buffer> Node<'_, B> {
             ticket: None,
             info: None,
             inputs: [empty; 4],
+            lengths: [None; 4],
             outputs: [empty; 4],
         }
     }

@@ -2,7 +2,7 @@
 
 use core::time::Duration;
 
-use crate::clock::{after, is_due};
+use crate::clock::{after, before, is_due};
 
 /// Frames that may wait when a scan adds one: the transmit queue stays shorter than 8 (decision 15).
 const WAITING: u32 = 6;
@@ -49,7 +49,7 @@ impl Pace {
 
     /// It was not taken.
     pub(super) fn take_back(&mut self) {
-        self.sent = self.sent.saturating_sub(self.frame);
+        self.sent = before(self.sent, self.frame);
     }
 
     /// A frame of another station has gone over the wire; ours waited meanwhile.
@@ -63,7 +63,7 @@ impl Pace {
 
     /// When one more frame may be handed out.
     pub(super) fn opens(&self) -> Duration {
-        self.sent.saturating_sub(self.ahead)
+        before(self.sent, self.ahead)
     }
 }
 

@@ -3,7 +3,7 @@
 use core::time::Duration;
 
 use embedded_can::Id;
-use pdo::{Handled, NodeId, cob};
+use pdo::{DefaultPdo, Handled, NodeId, RpdoFault, cob};
 
 use super::event::Notice;
 use super::node::Job;
@@ -46,15 +46,28 @@ impl<'d, B: Buffer, const N: usize> Master<'d, B, N> {
     #[cfg_attr(target_pointer_width = "32", inline(never))]
     #[cfg_attr(not(target_pointer_width = "32"), inline)]
     fn on_pdo(&mut self, number: usize, id: NodeId, data: &[u8]) {
-        let node = self.nodes.get_mut(usize::from(id.raw()) - 1);
-        let Some(image) = node.and_then(|node| node.inputs.get_mut(number)) else { return };
+        let Some(node) = self.nodes.get_mut(usize::from(id.raw()) - 1) else { return };
+        let (Some(image), Some(length)) = (node.inputs.get_mut(number), node.lengths.get_mut(number)) else {
+            return;
+        };
         let (Some(new), Some(flag)) = (self.input_new.get_mut(number), self.input_flag.get_mut(number))
         else {
             return;
         };
-        image.set(data);
-        new.insert(id);
-        flag.insert(id);
+        let mut mapped = data;
+        let mut result = Ok(());
+        if let Some(length) = length {
+            result = length.check(data.len() as u8);
+            mapped = data.get(..usize::from(length.expected())).unwrap_or(data);
+        }
+        if !matches!(result, Err(RpdoFault::TooShort(_))) {
+            image.set(mapped);
+            new.insert(id);
+            flag.insert(id);
+        }
+        if let (Err(fault), Some(number)) = (result, DefaultPdo::new(number as u8 + 1)) {
+            self.tell(Notice::Pdo(id, number, fault));
+        }
     }
 
     #[inline]
@@ -219,6 +232,7 @@ impl<B> Event<B> {
             | Self::Guarding { node, .. }
             | Self::Heartbeat { node, .. }
             | Self::Emergency { node, .. }
+            | Self::Pdo { node, .. }
             | Self::Sdo { node, .. }
             | Self::Booted { node, .. } => Some(*node),
             _ => None,

@@ -2,6 +2,7 @@
 
 mod boot;
 mod bus;
+mod length;
 mod net;
 mod watch;
 

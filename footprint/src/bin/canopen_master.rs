@@ -56,6 +56,7 @@ fn command(master: &mut Engine) {
     master.set_sync(sync::Producer::new(now(), black_box(0), now(), now()).ok());
     black_box(master.upload(node, at, Small::EMPTY, &options).is_ok());
     black_box(master.download(node, at, black_box(Small::EMPTY), &options).is_ok());
+    black_box(master.expect_pdo(node, black_box(DefaultPdo::First), black_box(Some(4))).is_ok());
     black_box(master.write_pdo(node, black_box(DefaultPdo::First), wire()).is_ok());
     black_box(master.boot(now(), node, black_box(&BOOT)).is_ok());
     black_box(master.scan(black_box(NodeSet::ALL), black_box(scan::Options::default())).is_ok());
