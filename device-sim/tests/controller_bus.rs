@@ -35,6 +35,8 @@ struct Rig {
     wanted: DriveSetpoint,
     /// The drive's plug is pulled.
     unplugged: bool,
+    failure: Option<lb2::code::Failure>,
+    /// Each once when it begins.
     failures: Vec<lb2::code::Failure>,
 }
 
@@ -47,6 +49,7 @@ impl Rig {
             drive: Ld2000::node(Some(node(1)), 1),
             wanted: DriveSetpoint::default(),
             unplugged: false,
+            failure: None,
             failures: Vec::new(),
         }
     }
@@ -57,7 +60,10 @@ impl Rig {
         let now = self.network.now();
         self.bus.read_drives(now, 2, 4, &mut inputs);
         assert_eq!(inputs.input_failures, inputs.output_failures);
-        self.failures.extend(inputs.output_failures[2]);
+        // A drive that is lost fails as long as it is.
+        let failure = inputs.output_failures[2];
+        self.failures.extend(failure.filter(|_| failure != self.failure));
+        self.failure = failure;
         self.bus.command(now, 0, &self.wanted);
         let end = now + CYCLE;
         if self.unplugged {
