@@ -68,6 +68,7 @@ pub(crate) struct Controller {
 }
 
 impl Controller {
+    #[allow(dead_code)] // not in every test program
     pub(crate) fn kill(mut self) {
         self.end();
     }
@@ -97,6 +98,7 @@ impl Ran {
         String::from_utf8_lossy(&self.0.stderr).into_owned()
     }
 
+    #[allow(dead_code)] // not in every test program
     pub(crate) fn json(&self) -> serde_json::Value {
         let value: serde_json::Value = serde_json::from_slice(&self.0.stdout).unwrap();
         assert_eq!(value["schema_version"], 1);
@@ -118,6 +120,7 @@ impl Ran {
 }
 
 /// Replaces a text in a file.
+#[allow(dead_code)] // not in every test program
 pub(crate) fn edit(path: &Path, from: &str, to: &str) {
     let text = std::fs::read_to_string(path).unwrap();
     assert!(text.contains(from), "{from:?} is not in {}", path.display());
