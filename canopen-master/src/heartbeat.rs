@@ -94,6 +94,13 @@ impl Consumer {
         self.lost
     }
 
+    /// Whether the end of the consumer time would be told.
+    #[must_use]
+    #[inline]
+    pub const fn is_watching(&self) -> bool {
+        self.active && !self.lost
+    }
+
     /// Takes a heartbeat or boot-up message.
     #[inline]
     pub fn handle(&mut self, now: Duration) -> Option<Event> {
@@ -114,7 +121,7 @@ impl Consumer {
     /// When the consumer time ends; `None` = not watching.
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Duration> {
-        (self.active && !self.lost).then(|| after_ms(self.last, self.time_ms.into()))
+        self.is_watching().then(|| after_ms(self.last, self.time_ms.into()))
     }
 }
 

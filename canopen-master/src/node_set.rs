@@ -45,7 +45,8 @@ impl NodeSet {
 
     /// Whether a node is in it.
     #[must_use]
-    pub const fn contains(self, node: NodeId) -> bool {
+    #[inline]
+    pub const fn contains(&self, node: NodeId) -> bool {
         self.0[Self::word(node)] & Self::bit(node) != 0
     }
 

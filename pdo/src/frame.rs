@@ -131,9 +131,8 @@ impl Frame {
     #[must_use]
     #[inline]
     pub fn data(&self) -> &[u8] {
-        // It is never above 8, which the compiler does not know.
-        let len = if self.is_remote() { 0 } else { self.len().min(8) };
-        self.data.get(..len).unwrap_or(&[])
+        let len = if self.is_remote() { 0 } else { self.len() };
+        if len >= 8 { &self.data } else { self.data.get(..len).unwrap_or(&[]) }
     }
 }
 

@@ -41,7 +41,8 @@ impl<'d, B: Buffer, const N: usize> Master<'d, B, N> {
             older.waiting = older.waiting.without(waiting);
         }
         let mut longest = 0;
-        for node in waiting.iter().filter_map(|id| self.node(id)) {
+        for id in waiting.iter() {
+            let Some(node) = self.node_mut(id) else { continue };
             let heartbeat = node.heartbeat.map_or(0, |consumer| consumer.time_ms().into());
             longest = longest.max(heartbeat).max(node.guard.map_or(0, |guard| guard.config().life_time_ms()));
         }
@@ -123,7 +124,7 @@ impl<'d, B: Buffer, const N: usize> Master<'d, B, N> {
         buffer: B,
         options: &sdo::Options,
     ) -> Result<sdo::Ticket, Refused<B>> {
-        self.transfer(node, buffer, |client, data| client.upload(at, data, options))
+        self.transfer(node, buffer, |client, buffer| client.upload_as(at, buffer, options, Data::User))
     }
 
     /// Writes what `buffer` holds to an object of a node.
@@ -137,17 +138,14 @@ impl<'d, B: Buffer, const N: usize> Master<'d, B, N> {
         buffer: B,
         options: &sdo::Options,
     ) -> Result<sdo::Ticket, Refused<B>> {
-        self.transfer(node, buffer, |client, data| client.download(at, data, options))
+        self.transfer(node, buffer, |client, buffer| client.download_as(at, buffer, options, Data::User))
     }
 
     fn transfer(
         &mut self,
         id: NodeId,
         buffer: B,
-        begin: impl FnOnce(
-            &mut sdo::Client<Data<'d, B>>,
-            Data<'d, B>,
-        ) -> Result<sdo::Ticket, sdo::Refused<Data<'d, B>>>,
+        begin: impl FnOnce(&mut sdo::Client<Data<'d, B>>, B) -> Result<sdo::Ticket, sdo::Refused<B>>,
     ) -> Result<sdo::Ticket, Refused<B>> {
         if let Err(error) = self.check(id).and_then(|()| self.check_bus()) {
             return Err(Refused { error, buffer });
@@ -159,17 +157,11 @@ impl<'d, B: Buffer, const N: usize> Master<'d, B, N> {
         if !matches!(node.job, Job::None) || !node.sdo.is_idle() {
             return Err(Refused { error: SubmitError::Busy(id), buffer });
         }
-        match begin(&mut node.sdo, Data::User(buffer)) {
-            Ok(ticket) => {
-                self.sdo_busy.insert(id);
-                self.sdo_ready.insert(id);
-                Ok(ticket)
-            }
-            Err(sdo::Refused { error, buffer: Data::User(buffer) }) => {
-                Err(Refused { error: error.into(), buffer })
-            }
-            Err(sdo::Refused { .. }) => unreachable!("the client gives back what it was given"),
-        }
+        let ticket = begin(&mut node.sdo, buffer)
+            .map_err(|sdo::Refused { error, buffer }| Refused { error: error.into(), buffer })?;
+        self.sdo_busy.insert(id);
+        self.sdo_ready.insert(id);
+        Ok(ticket)
     }
 
     /// Gives a transfer up, unless it has its outcome already.
@@ -221,7 +213,8 @@ impl<'d, B: Buffer, const N: usize> Master<'d, B, N> {
         self.check(node)?;
         self.check_bus()?;
         let index = usize::from(number.number()) - 1;
-        if let Some(image) = self.node_mut(node).and_then(|node| node.outputs.get_mut(index)) {
+        let slot = self.nodes.get_mut(usize::from(node.raw()) - 1);
+        if let Some(image) = slot.and_then(|node| node.outputs.get_mut(index)) {
             image.set(data);
         }
         if let Some(flag) = self.output_flag.get_mut(index) {

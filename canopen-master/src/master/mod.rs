@@ -28,7 +28,7 @@ pub use event::{Event, Refused, SubmitError};
 pub use node::Image;
 
 use event::Notice;
-use node::{Job, Node};
+use node::{Job, Node, UNUSUAL};
 use pace::Pace;
 
 /// Frames of NMT, TIME and [`Master::send`] that wait to be sent. PDOs, guarding, SDO and boot wait
@@ -254,6 +254,7 @@ impl<'d, B: Buffer, const N: usize> Master<'d, B, N> {
 
     /// TPDO 1…4 of a node as it came last.
     #[must_use]
+    #[inline]
     pub fn pdo(&self, node: NodeId, number: DefaultPdo) -> Option<&Image> {
         self.node(node)?.inputs.get(number as usize - 1)
     }
@@ -330,8 +331,12 @@ impl<'d, B: Buffer, const N: usize> Master<'d, B, N> {
         self.nodes.get(usize::from(node.raw()) - 1)
     }
 
+    /// For anything that may change what the node's next heartbeat means.
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
     fn node_mut(&mut self, node: NodeId) -> Option<&mut Node<'d, B>> {
-        self.nodes.get_mut(usize::from(node.raw()) - 1)
+        let node = self.nodes.get_mut(usize::from(node.raw()) - 1)?;
+        node.usual = UNUSUAL;
+        Some(node)
     }
 
     /// Room in the queue of events.

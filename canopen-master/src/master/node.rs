@@ -22,6 +22,7 @@ pub struct Image {
 impl Image {
     /// 0…8 bytes.
     #[must_use]
+    #[inline]
     pub fn data(&self) -> &[u8] {
         self.bytes.get(..usize::from(self.len)).unwrap_or(&[])
     }
@@ -104,21 +105,28 @@ pub(super) enum ScanStep {
     OpMode,
 }
 
+// What frames of a cycle touch lies together, on one or two lines of a cache.
 #[derive(Debug)]
+#[repr(C)]
 pub(super) struct Node<'d, B> {
-    pub(super) guard: Option<Guard>,
     pub(super) heartbeat: Option<Consumer>,
+    pub(super) inputs: [Image; 4],
+    /// `None`: any length.
+    pub(super) lengths: [Option<LengthCheck>; 4],
+    /// The heartbeat that would tell nothing but that the node is alive, or [`UNUSUAL`].
+    pub(super) usual: u8,
     pub(super) state: Option<State>,
+    pub(super) guard: Option<Guard>,
     pub(super) sdo: Client<Data<'d, B>>,
     pub(super) job: Job<'d>,
     /// Of the job's transfer.
     pub(super) ticket: Option<Ticket>,
     pub(super) info: Option<Info>,
-    pub(super) inputs: [Image; 4],
-    /// `None`: any length.
-    pub(super) lengths: [Option<LengthCheck>; 4],
     pub(super) outputs: [Image; 4],
 }
+
+/// No heartbeat: bit 7 belongs to guarding.
+pub(super) const UNUSUAL: u8 = 0xFF;
 
 impl<B: Buffer> Node<'_, B> {
     pub(super) const fn new(node: NodeId) -> Self {
@@ -127,6 +135,7 @@ impl<B: Buffer> Node<'_, B> {
             guard: None,
             heartbeat: None,
             state: None,
+            usual: UNUSUAL,
             sdo: Client::new(Channel::default_of(node)),
             job: Job::None,
             ticket: None,
@@ -134,6 +143,15 @@ impl<B: Buffer> Node<'_, B> {
             inputs: [empty; 4],
             lengths: [None; 4],
             outputs: [empty; 4],
+        }
+    }
+
+    /// The same heartbeat once more would tell nothing new, unless something changes until then: whoever
+    /// can change something is given the node by `Master::node_mut`, which sets it to [`UNUSUAL`].
+    pub(super) fn note_usual(&mut self, heartbeat: u8) {
+        let watched = self.heartbeat.as_ref().is_some_and(Consumer::is_watching);
+        if watched && self.guard.is_none() && matches!(self.job, Job::None) {
+            self.usual = heartbeat;
         }
     }
 

@@ -73,21 +73,11 @@ impl<'d, B: Buffer, const N: usize> Master<'d, B, N> {
     #[inline]
     fn on_error_control(&mut self, now: Duration, id: NodeId, data: &[u8]) {
         let Some(node) = self.nodes.get_mut(usize::from(id.raw()) - 1) else { return };
-        // Most frames: a heartbeat with nothing new.
+        // Most frames.
         if let (&[byte], Some(consumer)) = (data, &mut node.heartbeat)
-            && node.guard.is_none()
-            && byte != State::BootUp as u8
-            && node.state.is_some_and(|state| state as u8 == byte)
-            && !consumer.is_lost()
-            && !self.nmt_waiting.contains(id)
-            && matches!(node.job, Job::None)
+            && byte == node.usual
         {
-            let armed = consumer.poll_timeout().is_some();
             consumer.handle(now);
-            if !armed {
-                let at = consumer.poll_timeout();
-                self.due(at);
-            }
             return;
         }
         self.on_new_state(now, id, data);
@@ -129,6 +119,10 @@ impl<'d, B: Buffer, const N: usize> Master<'d, B, N> {
             _ => {}
         }
         self.note_state(now, id, state);
+        let awaited = toggled || self.nmt_waiting.contains(id);
+        if let Some(node) = self.node_mut(id).filter(|_| !awaited) {
+            node.note_usual(byte);
+        }
     }
 
     fn on_boot_up(&mut self, now: Duration, id: NodeId) {

@@ -198,6 +198,18 @@ impl<B: Buffer> Client<B> {
     /// [`SubmitError::Busy`] until the last outcome has been polled.
     #[inline]
     pub fn upload(&mut self, at: Address, buffer: B, options: &Options) -> Result<Ticket, Refused<B>> {
+        self.upload_as(at, buffer, options, |buffer| buffer)
+    }
+
+    /// The same where the client's buffer is made of the caller's.
+    #[inline]
+    pub(crate) fn upload_as<U>(
+        &mut self,
+        at: Address,
+        buffer: U,
+        options: &Options,
+        wrap: impl FnOnce(U) -> B,
+    ) -> Result<Ticket, Refused<U>> {
         if !self.is_idle() {
             return Err(Refused { error: SubmitError::Busy, buffer });
         }
@@ -208,7 +220,7 @@ impl<B: Buffer> Client<B> {
             self.tx = Some(Request::InitiateUpload { at }.encode());
             self.state = State::UploadBegun;
         }
-        Ok(self.begin(at, buffer, options))
+        Ok(self.begin(at, wrap(buffer), options))
     }
 
     /// Writes what `buffer` holds to an object.
@@ -217,7 +229,19 @@ impl<B: Buffer> Client<B> {
     /// [`SubmitError::Busy`] until the last outcome has been polled, [`SubmitError::Source`] if the
     /// buffer cannot be read.
     #[inline]
-    pub fn download(&mut self, at: Address, mut buffer: B, options: &Options) -> Result<Ticket, Refused<B>> {
+    pub fn download(&mut self, at: Address, buffer: B, options: &Options) -> Result<Ticket, Refused<B>> {
+        self.download_as(at, buffer, options, |buffer| buffer)
+    }
+
+    /// The same where the client's buffer is made of the caller's.
+    #[inline]
+    pub(crate) fn download_as<U: Buffer>(
+        &mut self,
+        at: Address,
+        mut buffer: U,
+        options: &Options,
+        wrap: impl FnOnce(U) -> B,
+    ) -> Result<Ticket, Refused<U>> {
         if !self.is_idle() {
             return Err(Refused { error: SubmitError::Busy, buffer });
         }
@@ -226,7 +250,7 @@ impl<B: Buffer> Client<B> {
             && self.size.is_none_or(|size| size > u32::from(block.threshold))
         {
             self.begin_block_download(at, block, self.size);
-            return Ok(self.begin(at, buffer, options));
+            return Ok(self.begin(at, wrap(buffer), options));
         }
         let begun = segmented::begin_download(at, &mut buffer, self.size);
         let (tx, sent) = match begun {
@@ -235,7 +259,7 @@ impl<B: Buffer> Client<B> {
         };
         self.tx = Some(tx);
         self.state = State::DownloadBegun { sent };
-        Ok(self.begin(at, buffer, options))
+        Ok(self.begin(at, wrap(buffer), options))
     }
 
     #[inline]
