@@ -47,6 +47,7 @@ impl LengthCheck {
 
     /// Bytes that are mapped.
     #[must_use]
+    #[inline]
     pub const fn expected(self) -> u8 {
         self.expected
     }
