@@ -2,7 +2,9 @@
 """Compares `motionctl --json decode` with tshark, frame by frame: service, node, index, sub-index,
 command, data. Every kind of difference is listed with its reason; one without a reason fails.
 
-    tshark_agrees.py MOTIONCTL FILE...
+    tshark_agrees.py MOTIONCTL [--has KIND,KIND...] FILE...
+
+--has: every file must have frames of these kinds (of SDO, also the commands), so that agreement says something.
 """
 import collections
 import json
@@ -115,6 +117,7 @@ REASONS = [
     ("toggle (sdo-request, block-segment)", "tshark keeps no state, so it reads a segment of a block transfer as a "
      "frame with a command byte"),
     ("toggle (sdo-response, block-segment)", "as in requests"),
+    ("command: tshark says 'Unknown (0x7)', here block-segment", "as in requests"),
     ("index (sdo-request, block-segment)", "as in requests"),
     ("index (sdo-response, block-segment)", "as in requests"),
 ]
@@ -122,6 +125,10 @@ REASONS = [
 
 def main():
     motionctl, *files = sys.argv[1:]
+    wanted = set()
+    if files[0] == "--has":
+        wanted = set(files[1].split(","))
+        files = files[2:]
     unexplained = 0
     for path in files:
         frames = ours(motionctl, path)
@@ -129,6 +136,10 @@ def main():
             as_log(frames, log)
         seen = theirs(log.name)
         os.unlink(log.name)
+        missing = wanted - {frame[key] for frame in frames for key in ("kind", "command") if key in frame}
+        if missing:
+            print(f"{os.path.basename(path)}: no frame of {', '.join(sorted(missing))}")
+            unexplained += 1
         if len(seen) != len(frames):
             print(f"{os.path.basename(path)}: tshark gives {len(seen)} frames of {len(frames)}")
             unexplained += 1

@@ -15,6 +15,9 @@ use super::{BusError, BusEvent, BusState, CanPort, Event};
 use crate::endpoint::CanEndpoint;
 use crate::port::{OpenError, poll_limit};
 
+/// Room for received frames in bytes, of which the kernel counts some hundreds for each.
+const RECEIVE_BUFFER: usize = 1 << 22;
+
 struct Port {
     socket: CanSocket,
     start: Instant,
@@ -30,7 +33,17 @@ pub(super) fn open(endpoint: &CanEndpoint, interface: &str) -> Result<Box<dyn Ca
     let socket = CanSocket::open(interface).map_err(failed)?;
     socket.set_nonblocking(true).map_err(failed)?;
     socket.set_error_filter_accept_all().map_err(failed)?;
+    // The kernel drops what nobody has fetched in time; it gives as much room as its limit allows.
+    let _ = socket.as_raw_socket().set_recv_buffer_size(RECEIVE_BUFFER);
     Ok(Box::new(Port { socket, start: Instant::now(), events: VecDeque::new() }))
+}
+
+/// An interface that somebody has taken down is gone, other than a bus that is off and comes back.
+fn down(error: io::Error) -> io::Error {
+    match error.raw_os_error() {
+        Some(100) => io::Error::new(io::ErrorKind::NotConnected, "the interface is down"),
+        _ => error,
+    }
 }
 
 impl CanPort for Port {
@@ -41,7 +54,7 @@ impl CanPort for Port {
         match self.socket.write_frame(&frame) {
             // No buffer space: the interface's transmit queue is full.
             Err(error) if error.raw_os_error() == Some(105) => Err(io::ErrorKind::WouldBlock.into()),
-            sent => sent,
+            sent => sent.map_err(down),
         }
     }
 
@@ -59,7 +72,7 @@ impl CanPort for Port {
                 Ok(frame) => return Ok(Frame::from_can(&frame).map(Event::Frame)),
                 Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
-                Err(error) => return Err(error),
+                Err(error) => return Err(down(error)),
             }
             let left = end.saturating_sub(self.start.elapsed());
             if left.is_zero() {

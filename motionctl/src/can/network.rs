@@ -61,7 +61,7 @@ fn show_states(session: &mut Session, nodes: NodeSet) -> Result<(), Exit> {
         if known || session.now() >= limit {
             return Ok(());
         }
-        session.turn(limit, |_, _, _| {})?;
+        session.step(limit)?;
         while session.master().poll_event().is_some() {}
     }
 }
@@ -238,7 +238,7 @@ pub(crate) fn guard(
             .map_err(|error| Exit::trouble(error.to_string()))?;
     }
     stream(&mut session, run, |session, limit| {
-        session.turn(limit, |_, _, _| {})?;
+        session.step(limit)?;
         while let Some(event) = session.master().poll_event() {
             let (node, event) = match event {
                 Event::Guarding { node, event: GuardEvent::Lost } => (node, "lost"),
@@ -263,7 +263,7 @@ pub(crate) fn guard(
 pub(crate) fn emcy(out: &Output, global: &Global, line: &CanLine, run: &Stream) -> Result<(), Exit> {
     let mut session = Session::open(global, line)?;
     stream(&mut session, run, |session, limit| {
-        session.turn(limit, |_, _, _| {})?;
+        session.step(limit)?;
         while let Some(event) = session.master().poll_event() {
             let Event::Emergency { node, emergency } = event else { continue };
             let t = session.now().as_secs_f64();

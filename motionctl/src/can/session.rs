@@ -138,6 +138,8 @@ pub(crate) struct Session {
     answer: Duration,
     watched: Option<(NodeId, bool)>,
     mode: Option<Mode>,
+    /// What of the bus was told last.
+    told: Option<BusEvent>,
 }
 
 /// The endpoint that `--can`, the environment or the configuration names.
@@ -187,7 +189,7 @@ impl Session {
             config.bit_rate = bit_rate;
         }
         let wire = Wire(Box::new(Master::new(config)));
-        Ok(Self { driver: Driver::new(port), wire, answer, watched: None, mode: None })
+        Ok(Self { driver: Driver::new(port), wire, answer, watched: None, mode: None, told: None })
     }
 
     pub(crate) fn now(&self) -> Duration {
@@ -222,6 +224,21 @@ impl Session {
         done.map_err(|error| gone(&error))
     }
 
+    /// One turn, at most until `limit`; what the bus says is told to the user, who may wonder why nobody
+    /// answers.
+    pub(crate) fn step(&mut self, limit: Duration) -> Result<(), Exit> {
+        let mut told = self.told;
+        self.turn(limit, |_, event, _| {
+            if let PortEvent::Bus(event) = event
+                && told.replace(event) != Some(event)
+            {
+                eprintln!("note: {event}");
+            }
+        })?;
+        self.told = told;
+        Ok(())
+    }
+
     /// Runs until `pick` takes an event, at most until `limit`.
     pub(crate) fn wait<T>(
         &mut self,
@@ -237,7 +254,7 @@ impl Session {
             if self.now() >= limit {
                 return Ok(None);
             }
-            self.turn(limit, |_, _, _| {})?;
+            self.step(limit)?;
         }
     }
 
