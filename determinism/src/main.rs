@@ -36,5 +36,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         println!("cycle {cycles:5}  {hash:016x}");
     })?;
     println!("{counts:?}\n{hash:016x}");
+    if counts.arrived.contains(&0) {
+        return Err("an axis does not move: make the recording anew, with \
+                    cargo test -p conformance --test determinism -- --ignored"
+            .into());
+    }
     Ok(())
 }
