@@ -119,6 +119,14 @@ codes! {
     }
 }
 
+impl Command {
+    /// Whether it reads and changes nothing that the drive keeps.
+    #[must_use]
+    pub const fn is_reading(self) -> bool {
+        matches!(self.0, 0x00 | 0x10 | 0x11 | 0x15..=0x17 | 0x20..=0x23 | 0x60..=0x62 | 0x70..=0x74 | 0x85..=0x8E)
+    }
+}
+
 impl Status {
     /// 00h and 04h: the command was carried out.
     #[must_use]

@@ -5,12 +5,15 @@
 //! leave open is read in every form: with or without `@` and the `h` of hex numbers, separated by
 //! commas, semicolons, tabs or blanks, columns in any order (decision 26).
 
+mod event;
 mod parse;
+mod row;
 #[cfg(feature = "alloc")]
 mod text;
 mod write;
 
-pub use parse::{Event, Parser, Problem, Severity};
+pub use event::{Event, Problem, Severity};
+pub use parse::Parser;
 #[cfg(feature = "alloc")]
 pub use text::{Encoding, LineDecoder};
 pub use write::Writer;

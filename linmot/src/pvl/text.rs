@@ -35,6 +35,15 @@ impl Encoding {
         }
     }
 
+    /// The text of bytes in this encoding, without the mark. In UTF-8 what is none becomes U+FFFD.
+    #[must_use]
+    pub fn decode(self, bytes: &[u8]) -> Cow<'_, str> {
+        match self {
+            Self::Utf8 | Self::Utf8Mark => alloc::string::String::from_utf8_lossy(bytes),
+            Self::Windows1252 => WINDOWS_1252.decode_without_bom_handling(bytes).0,
+        }
+    }
+
     /// What the file begins with.
     #[must_use]
     pub const fn mark(self) -> &'static [u8] {

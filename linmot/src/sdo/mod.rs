@@ -4,14 +4,14 @@
 //! This is a mapping only: [`Access`] and [`Answer`] go through any SDO client or server. All of it
 //! is expedited with 4 bytes, so both also have their 8-byte telegram.
 
-use core::time::Duration;
+mod client;
+mod server;
 
-use crate::code::Status;
-use crate::curve::INFO_WORDS;
-use crate::drive::{Drive, Service};
-use crate::request::{Access as Curve, List, Memory, Reply, Request, Value};
-use crate::table::ENTRY_WORDS;
+use crate::request::{Access as Curve, List, Memory, Request, Value};
 use crate::upid::{Layer, Upid};
+
+pub use client::{Aborted, Client};
+pub use server::Server;
 
 /// Index that UPIDs, curve IDs, entries and error codes are added to.
 pub const BASE: u16 = 0x2000;
@@ -49,6 +49,24 @@ pub mod abort {
     pub const STATE: u32 = 0x0800_0022;
     /// Command specifier not valid.
     pub const COMMAND: u32 = 0x0504_0001;
+
+    /// What one of these codes says; empty for any other.
+    #[must_use]
+    pub const fn text(code: u32) -> &'static str {
+        match code {
+            READ_ONLY => "read-only",
+            WRITE_ONLY => "write-only",
+            NO_OBJECT => "no such object",
+            NO_SUB_INDEX => "no such sub-index",
+            TYPE => "type or length does not match",
+            VALUE => "invalid value",
+            TOO_HIGH => "value too high",
+            TOO_LOW => "value too low",
+            STATE => "not in the drive's present state",
+            COMMAND => "command specifier not valid",
+            _ => "",
+        }
+    }
 }
 
 /// One access to an object.
@@ -315,208 +333,11 @@ const fn telegram(command: u8, index: u16, sub: u8, data: [u8; 4]) -> [u8; 8] {
     [command, low, high, sub, a, b, c, d]
 }
 
-/// An abort that is no answer of the configuration service.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("the drive aborted with {0:08X}h")]
-pub struct Aborted(pub u32);
-
-/// The client's side: what SDO answers leave out (how many words a block still has) is remembered
-/// here, so that replies are the same as on the other carriers.
-#[derive(Debug, Clone, Default)]
-pub struct Client {
-    info: usize,
-    data: usize,
-    entry: usize,
-}
-
-impl Client {
-    /// No block under way.
-    #[must_use]
-    pub const fn new() -> Self {
-        Self { info: 0, data: 0, entry: 0 }
-    }
-
-    /// What the answer to `request` says.
-    ///
-    /// # Errors
-    /// [`Aborted`] with a code that stands for no status.
-    pub fn reply(&mut self, request: &Request, answer: Answer) -> Result<Reply, Aborted> {
-        let [first, ..] = request.words();
-        let value = |status, data: [u8; 4]| Reply::with_value(status, first, u32::from_le_bytes(data));
-        let next = |left: &mut usize| {
-            *left = left.saturating_sub(1);
-            if *left == 0 { Status::OK } else { Status::NOT_FINISHED }
-        };
-        let data = match answer {
-            Answer::Abort(code) => return refusal(code).map(|status| Reply::new(status, [first, 0, 0])),
-            Answer::Written([_, _, result, _]) => {
-                let status = match (Status(result), request) {
-                    // The examples show 04h for a list that was started.
-                    (Status::NOT_FINISHED, Request::StartList { .. }) => Status::OK,
-                    // Writing flash goes on; its state tells when it ends.
-                    (Status::OK, Request::SaveCurves | Request::SaveTable | Request::Start) => {
-                        Status::RUNNING
-                    }
-                    (status, _) => status,
-                };
-                return Ok(Reply::new(status, request.words()));
-            }
-            Answer::Read(data) => data,
-        };
-        let [a, b, c, d] = data;
-        let (low, high) = (u16::from_le_bytes([a, b]), u16::from_le_bytes([c, d]));
-        Ok(match request {
-            Request::NextItem(_) if high == END_OF_LIST => Reply::new(Status::END, [high, 0, 0]),
-            Request::NextItem(_) => Reply::new(Status::OK, [high, low, 0]),
-            Request::StartCurve { .. } => {
-                self.info = INFO_WORDS;
-                self.data = usize::from(high / 4);
-                Reply::new(Status(a), [first, b.into(), high])
-            }
-            Request::CurveInfo { .. } => value(next(&mut self.info), data),
-            Request::CurveData { .. } => value(next(&mut self.data), data),
-            // The code lies in the upper two bytes.
-            Request::ErrorCode { .. } => Reply::new(Status::OK, [first, high, 0]),
-            Request::GetEntry { .. } => {
-                self.entry = ENTRY_WORDS;
-                Reply::new(Status::OK, [first, low, 0])
-            }
-            Request::GetEntryData { .. } => value(next(&mut self.entry), data),
-            _ => value(Status::OK, data),
-        })
-    }
-
-    /// Whether an answer to [`Access::flash_state`] says that flash is still being written.
-    #[must_use]
-    pub const fn is_flash_busy(answer: Answer) -> bool {
-        matches!(answer, Answer::Read([state, ..]) if state != 0)
-    }
-}
-
-fn refusal(code: u32) -> Result<Status, Aborted> {
-    Ok(match code {
-        abort::NO_OBJECT => Status::UPID,
-        abort::READ_ONLY | abort::WRITE_ONLY => Status::USAGE,
-        abort::VALUE | abort::TOO_HIGH | abort::TOO_LOW => Status::RANGE,
-        abort::TYPE => Status::TYPE,
-        _ => return Err(Aborted(code)),
-    })
-}
-
-/// The drive's side (decision 27 for what the documents leave open).
-#[derive(Debug, Clone, Default)]
-pub struct Server {
-    service: Service,
-    curve_result: LastResult,
-    table_result: LastResult,
-    modifying: bool,
-    away: bool,
-}
-
-/// A result that is 00h until there is one.
-#[derive(Debug, Clone, Copy, Default)]
-struct LastResult(u8);
-
-impl Server {
-    /// As after a restart.
-    #[must_use]
-    pub fn new() -> Self {
-        Self::default()
-    }
-
-    /// Whether this index belongs to the configuration service rather than to the drive's other
-    /// objects.
-    #[must_use]
-    pub const fn serves(index: u16) -> bool {
-        index >= BASE && index <= BASE + 0x3EFF
-    }
-
-    /// Carries one access out; `None` while the drive restarts.
-    pub fn execute(&mut self, now: Duration, access: &Access, drive: &mut impl Drive) -> Option<Answer> {
-        if drive.is_restarting(now) {
-            self.away = true;
-            return None;
-        }
-        if core::mem::take(&mut self.away) {
-            *self = Self::new();
-        }
-        if access.write.is_none() && access.index == BASE {
-            let busy = if drive.is_busy(now) { Status::NOT_FINISHED.0 } else { 0 };
-            match access.sub {
-                FLASH_STATE => return Some(Answer::Read([busy, 0, 0, 0])),
-                0x80 => return Some(Answer::Read([busy, 0, 0, 0])),
-                CURVE_RESULT => return Some(Answer::Read([self.curve_result.0, 0, 0, 0])),
-                TABLE_RESULT => return Some(Answer::Read([self.table_result.0, 0, 0, 0])),
-                _ => {}
-            }
-        }
-        let Some(request) = access.request(self.modifying) else {
-            return Some(Answer::Abort(abort::NO_SUB_INDEX));
-        };
-        if let Request::StartCurve { access, .. } = request {
-            self.modifying = access == Curve::Modify;
-        }
-        let reply = self.service.execute(now, &request, drive);
-        let result = LastResult(if reply.status == Status::RUNNING { 0 } else { reply.status.0 });
-        match request.command().0 {
-            0x40..=0x62 => self.curve_result = result,
-            0x80..=0x8E => self.table_result = result,
-            _ => {}
-        }
-        if access.write.is_some() {
-            return Some(match refused(&reply, &request, drive) {
-                Some(code) => Answer::Abort(code),
-                None => Answer::Written([0, 0, result.0, 0]),
-            });
-        }
-        let [first, low, high] = reply.words;
-        let ([a, b], [c, d]) = (low.to_le_bytes(), high.to_le_bytes());
-        let two = |low: u16, high: u16| {
-            let ([a, b], [c, d]) = (low.to_le_bytes(), high.to_le_bytes());
-            Answer::Read([a, b, c, d])
-        };
-        Some(match request {
-            Request::NextItem(_) if reply.status == Status::END => two(0, END_OF_LIST),
-            Request::NextItem(_) if reply.status == Status::OK => {
-                let usage = drive.parameter(Upid(first)).map_or(0, |parameter| parameter.usage.0);
-                two(usage, first)
-            }
-            Request::StartCurve { .. } if !reply.status.is_done() => Answer::Read([reply.status.0, 0, 0, 0]),
-            Request::StartCurve { .. } => Answer::Read([reply.status.0, a, c, d]),
-            _ if !reply.status.is_done() => {
-                Answer::Abort(refused(&reply, &request, drive).unwrap_or(abort::STATE))
-            }
-            Request::ErrorCode { .. } => two(0, low),
-            _ => Answer::Read([a, b, c, d]),
-        })
-    }
-}
-
-/// The abort code of a parameter access that the service refused; curve and table services give
-/// their result in the answer instead.
-fn refused(reply: &Reply, request: &Request, drive: &impl Drive) -> Option<u32> {
-    Some(match reply.status {
-        Status::UPID => abort::NO_OBJECT,
-        Status::TYPE => abort::TYPE,
-        Status::USAGE if matches!(request, Request::Read { .. }) => abort::WRITE_ONLY,
-        Status::USAGE => abort::READ_ONLY,
-        Status::BUSY | Status::NO_START => abort::STATE,
-        Status::RANGE => match *request {
-            Request::Write { upid, value, .. } => {
-                let parameter = drive.parameter(upid)?;
-                let number = |raw| parameter.kind.number(raw);
-                let above = number(value & parameter.kind.mask()) > number(parameter.maximum);
-                if above { abort::TOO_HIGH } else { abort::TOO_LOW }
-            }
-            _ => abort::VALUE,
-        },
-        _ => return None,
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::code::Status;
+    use crate::request::Reply;
     use crate::request::tests::any_request;
     use proptest::prelude::*;
     use std::vec::Vec;
