@@ -4,7 +4,7 @@ use core::time::Duration;
 use std::io::Cursor;
 
 use device_sim::linmot::{Times, VirtualDrive, sg5};
-use linmot::curve::{InfoBlock, sine};
+use linmot::curve::{InfoBlock, Profile};
 use linmot::drive::{Drive, Service};
 use linmot::link::{Link, LinkExt};
 use linmot::pvl::Encoding;
@@ -81,7 +81,7 @@ fn fill(link: &mut Direct) -> [Entry; 2] {
         let info = InfoBlock::position_over_time(id, "Example_Curve", 20_000, count).unwrap();
         link.start_curve(Access::Add, &info).unwrap();
         for number in 1..=count {
-            let setpoint = sine(0, 1_000_000, number - 1, count);
+            let setpoint = Profile::Sine.setpoint(0, 1_000_000, number - 1, count);
             link.write_setpoint(Access::Add, &info, number.into(), setpoint).unwrap();
         }
     }

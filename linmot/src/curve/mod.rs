@@ -1,6 +1,10 @@
-//! Curves: info block, object type, units, setpoints, profiles (manual B 5).
+//! Curves: info block, object type, units (manual B 5); setpoints of a motion profile or from points.
+
+mod setpoints;
 
 use core::fmt;
+
+pub use setpoints::{Profile, resample, rounded};
 
 /// Curve IDs that a drive knows (manual B 5.2.6).
 pub const IDS: core::ops::RangeInclusive<u16> = 1..=100;
@@ -311,46 +315,13 @@ impl InfoBlock {
     }
 }
 
-/// One setpoint of the rest-to-rest motion `start` → `end` with the given number of setpoints that
-/// the manufacturer's example curve follows: start + (end − start)·(1 − cos(π·n/(N−1)))/2, rounded
-/// half away from zero.
-#[must_use]
-pub fn sine(start: i32, end: i32, setpoint: u16, setpoints: u16) -> i32 {
-    let intervals = f64::from(setpoints.max(2) - 1);
-    let share = (1.0 - libm::cos(core::f64::consts::PI * f64::from(setpoint) / intervals)) / 2.0;
-    rounded(f64::from(start) + (f64::from(end) - f64::from(start)) * share)
-}
-
-/// One setpoint of the line through `points` (x in ascending order, y), cut into equal steps from
-/// the first x to the last; before and behind them the nearest y. `None` without points.
-#[must_use]
-pub fn resample(points: &[(f64, f64)], setpoint: u16, setpoints: u16) -> Option<i32> {
-    let (first, last) = (points.first()?, points.last()?);
-    let intervals = f64::from(setpoints.max(2) - 1);
-    let x = first.0 + (last.0 - first.0) * f64::from(setpoint) / intervals;
-    let after = points.partition_point(|point| point.0 < x);
-    let (Some(right), Some(left)) = (points.get(after), after.checked_sub(1).and_then(|n| points.get(n)))
-    else {
-        return Some(rounded(points.get(after).unwrap_or(last).1));
-    };
-    let width = right.0 - left.0;
-    let share = if width > 0.0 { (x - left.0) / width } else { 1.0 };
-    Some(rounded(left.1 + (right.1 - left.1) * share))
-}
-
-/// Saturates at the ends of the range.
-fn rounded(value: f64) -> i32 {
-    libm::round(value) as i32
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use proptest::prelude::*;
-    use std::vec::Vec;
 
     /// Manual B, figure 13: the info block of the example curve.
-    pub(crate) const WORDS: [u32; INFO_WORDS] = [
+    const WORDS: [u32; INFO_WORDS] = [
         0x0003_0046,
         0x0004_000A,
         0x6D61_7845,
@@ -370,10 +341,6 @@ mod tests {
         0,
         0,
     ];
-    /// Manual B, figure 13: its setpoints.
-    const DATA: [i32; 10] =
-        [0, 0x75CA, 0x1_C8F2, 0x3_D090, 0x6_4DF8, 0x8_F448, 0xB_71B0, 0xD_794E, 0xE_CC76, 0xF_4240];
-
     #[test]
     fn the_example_curve() {
         let info = InfoBlock::parse(&WORDS);
@@ -386,12 +353,6 @@ mod tests {
         built.wizard[0] = 1_000_000;
         assert_eq!(built.encode(), WORDS);
         assert_eq!((info.x(0), info.x(1), info.x(9)), (0, 2222, 20_000));
-    }
-
-    #[test]
-    fn its_setpoints_are_a_sine() {
-        let sines: Vec<i32> = (0..10).map(|n| sine(0, 1_000_000, n, 10)).collect();
-        assert_eq!(sines, DATA);
     }
 
     #[test]
@@ -420,15 +381,6 @@ mod tests {
         assert!(matches!(check(|i| i.x_unit = Unit::ENCODER), CurveError::Units { .. }));
         let long = "a name of 22 bytes long";
         assert_eq!(InfoBlock::cam(1, long, 1, 2), Err(CurveError::Name(long.len())));
-    }
-
-    #[test]
-    fn lines_are_cut_into_equal_steps() {
-        let points = [(0.0, 0.0), (1.0, 100.0), (4.0, -200.0)];
-        let cut: Vec<i32> = (0..5).map(|n| resample(&points, n, 5).unwrap()).collect();
-        assert_eq!(cut, [0, 100, 0, -100, -200]);
-        assert_eq!(resample(&[], 0, 2), None);
-        assert_eq!(resample(&[(3.0, 7.4)], 1, 2), Some(7));
     }
 
     proptest! {
