@@ -5,6 +5,7 @@
 
 pub mod can;
 pub mod capture;
+mod clock;
 #[cfg(feature = "tokio")]
 pub mod codec;
 pub mod endpoint;

@@ -18,6 +18,12 @@ pub trait Port: Send {
     /// # Errors
     /// The endpoint failed or is gone.
     fn send(&mut self, bytes: &[u8]) -> io::Result<()>;
+
+    /// The time by which whoever uses the endpoint reckons its deadlines, since any fixed moment: the
+    /// clock of this machine, or that of a virtual wire.
+    fn now(&self) -> Duration {
+        crate::clock::now()
+    }
 }
 
 /// A time limit for the kernel's `poll`, which takes no endless ones.

@@ -125,6 +125,12 @@ pub trait CanPort: Send {
     /// The endpoint failed or is gone.
     fn receive(&mut self, timeout: Duration) -> io::Result<Option<Event>>;
 
+    /// The time by which whoever uses the endpoint reckons its deadlines, since any fixed moment: the
+    /// clock of this machine, or that of a virtual wire.
+    fn now(&self) -> Duration {
+        crate::clock::now()
+    }
+
     /// Waits up to `timeout` until somebody can hear us, where the endpoint knows: of an adapter that we
     /// are, until a host has opened the channel. Returns whether somebody can.
     ///

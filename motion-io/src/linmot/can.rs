@@ -2,36 +2,57 @@
 
 use core::time::Duration;
 use std::io;
-use std::time::Instant;
 
 use linmot::client::{Client, Outcome};
-use linmot::code::Status;
+use linmot::code::{Command, Status};
 use linmot::link::Link;
 use linmot::module::{RPDO, TPDO};
 use linmot::request::{Reply, Request};
 use linmot::sdo::{self, Access, Answer};
-use pdo::{Frame, NodeId};
+use pdo::{Frame, NodeId, cob};
 
 use super::{BUSY, LinkError, PAUSE};
 use crate::can::{CanPort, Event};
 
-/// COB-IDs of the default SDO without node ID (CiA 301).
-const SDO_REQUEST: u16 = 0x600;
-const SDO_ANSWER: u16 = 0x580;
+/// NMT command specifier of "start" (CiA 301, 7.2.8.3.1).
+const START: u8 = 0x01;
 /// Longest time for an SDO answer.
 const ANSWER: Duration = Duration::from_millis(500);
 
+/// Frames that are looked through before a request, on a bus where they never end.
+const STALE: u32 = 1000;
+
 /// Sends, waiting for room in the endpoint's queue.
 fn send(port: &mut dyn CanPort, frame: &Frame, limit: Duration) -> io::Result<()> {
-    let began = Instant::now();
+    let end = port.now().saturating_add(limit);
     loop {
         match port.send(frame) {
-            Err(error) if error.kind() == io::ErrorKind::WouldBlock && began.elapsed() < limit => {
+            Err(error) if error.kind() == io::ErrorKind::WouldBlock && port.now() < end => {
                 port.receive(Duration::from_millis(1))?;
             }
             other => return other,
         }
     }
+}
+
+/// Whether the node has started anew.
+fn is_boot_up(frame: &Frame, node: NodeId) -> bool {
+    frame.standard_id() == Some(cob::ERROR_CONTROL + u16::from(node.raw())) && frame.data() == [0]
+}
+
+/// Takes what has come and belongs to nothing any more; returns whether the node has started anew.
+fn drain(port: &mut dyn CanPort, node: NodeId) -> io::Result<bool> {
+    let mut booted = false;
+    for _ in 0..STALE {
+        let Some(event) = port.receive(Duration::ZERO)? else { break };
+        booted |= matches!(event, Event::Frame(frame) if is_boot_up(&frame, node));
+    }
+    Ok(booted)
+}
+
+/// Why a command was not answered.
+fn silence(command: Command, booted: bool) -> LinkError {
+    if booted { LinkError::Restarted { command } } else { LinkError::NoAnswer { command } }
 }
 
 /// A drive behind its default SDO.
@@ -41,6 +62,8 @@ pub struct SdoLink {
     client: sdo::Client,
     answer: Duration,
     retries: u8,
+    /// The node has started anew since the command began.
+    booted: bool,
 }
 
 impl core::fmt::Debug for SdoLink {
@@ -54,24 +77,28 @@ impl SdoLink {
     /// time for one answer, 0.5 s by default.
     #[must_use]
     pub fn new(port: Box<dyn CanPort>, node: NodeId, answer: Option<Duration>, retries: u8) -> Self {
-        Self { port, node, client: sdo::Client::new(), answer: answer.unwrap_or(ANSWER), retries }
+        let (client, answer) = (sdo::Client::new(), answer.unwrap_or(ANSWER));
+        Self { port, node, client, answer, retries, booted: false }
     }
 
     /// One access; `None` when no answer came.
     fn exchange(&mut self, access: &Access) -> io::Result<Option<Answer>> {
         let node = u16::from(self.node.raw());
-        send(self.port.as_mut(), &Frame::standard(SDO_REQUEST + node, access.encode()), self.answer)?;
-        let began = Instant::now();
+        // An answer that the bus has delivered twice must not be taken for the next one.
+        self.booted |= drain(self.port.as_mut(), self.node)?;
+        send(self.port.as_mut(), &Frame::standard(cob::SDO_REQUEST + node, access.encode()), self.answer)?;
+        let end = self.port.now().saturating_add(self.answer);
         loop {
-            let left = self.answer.saturating_sub(began.elapsed());
-            let event = self.port.receive(left)?;
-            if let Some(Event::Frame(frame)) = event
-                && frame.standard_id() == Some(SDO_ANSWER + node)
-                && let Ok(telegram) = <[u8; 8]>::try_from(frame.data())
-                && let Some((index, sub, answer)) = Answer::parse(telegram)
-                && (index, sub) == (access.index, access.sub)
-            {
-                return Ok(Some(answer));
+            let left = end.saturating_sub(self.port.now());
+            if let Some(Event::Frame(frame)) = self.port.receive(left)? {
+                self.booted |= is_boot_up(&frame, self.node);
+                if frame.standard_id() == Some(cob::SDO_RESPONSE + node)
+                    && let Ok(telegram) = <[u8; 8]>::try_from(frame.data())
+                    && let Some((index, sub, answer)) = Answer::parse(telegram)
+                    && (index, sub) == (access.index, access.sub)
+                {
+                    return Ok(Some(answer));
+                }
             }
             if left.is_zero() {
                 return Ok(None);
@@ -92,18 +119,21 @@ impl SdoLink {
     }
 
     /// Flash is written and the software started while the drive answers "busy" here.
-    fn wait(&mut self, command: linmot::code::Command) -> Result<(), LinkError> {
-        let began = Instant::now();
+    fn wait(&mut self, command: Command) -> Result<(), LinkError> {
+        let end = self.port.now().saturating_add(BUSY);
         loop {
             match self.exchange(&Access::flash_state())? {
                 Some(answer) if sdo::Client::is_flash_busy(answer) => {}
                 Some(_) => return Ok(()),
-                None => return Err(LinkError::NoAnswer { command }),
+                None => return Err(silence(command, self.booted)),
             }
-            if began.elapsed() > BUSY {
+            let again = self.port.now().saturating_add(PAUSE);
+            if again > end {
                 return Err(LinkError::StillBusy { command });
             }
-            std::thread::sleep(PAUSE);
+            while self.port.now() < again {
+                self.port.receive(again.saturating_sub(self.port.now()))?;
+            }
         }
     }
 }
@@ -114,6 +144,7 @@ impl Link for SdoLink {
     fn call(&mut self, request: &Request) -> Result<Reply, LinkError> {
         let command = request.command();
         let access = Access::new(request).ok_or(LinkError::NotCarried(command))?;
+        self.booted = false;
         let attempts = if request.is_repeatable() { 1 + u32::from(self.retries) } else { 1 };
         for _ in 0..attempts {
             let Some(answer) = self.exchange(&access)? else { continue };
@@ -130,16 +161,19 @@ impl Link for SdoLink {
             }
             return Ok(reply);
         }
-        Err(LinkError::NoAnswer { command })
+        Err(silence(command, self.booted))
     }
 }
 
-/// A drive behind the configuration module, carried in RPDO 4 and TPDO 4 (project-defined).
+/// A drive behind the configuration module, carried in RPDO 4 and TPDO 4 (project-defined). A node takes
+/// PDOs in operational only (CiA 301, 7.3.2.2.3): it is started with the first command, and again after
+/// it has started anew.
 pub struct PdoLink {
     port: Box<dyn CanPort>,
     node: NodeId,
     client: Client,
-    start: Instant,
+    /// The node has been told to start.
+    operational: bool,
 }
 
 impl core::fmt::Debug for PdoLink {
@@ -152,26 +186,34 @@ impl PdoLink {
     /// The drive `node` on `port`.
     #[must_use]
     pub fn new(port: Box<dyn CanPort>, node: NodeId, client: Client) -> Self {
-        Self { port, node, client, start: Instant::now() }
+        Self { port, node, client, operational: false }
     }
 
-    fn turn(&mut self) -> io::Result<()> {
+    /// Returns whether the node has started anew.
+    fn turn(&mut self) -> io::Result<bool> {
         let node = u16::from(self.node.raw());
-        if let Some(image) = self.client.poll_transmit(self.start.elapsed()) {
+        if !core::mem::replace(&mut self.operational, true) {
+            send(self.port.as_mut(), &Frame::standard(cob::NMT, [START, self.node.raw()]), ANSWER)?;
+        }
+        if let Some(image) = self.client.poll_transmit(self.port.now()) {
             send(self.port.as_mut(), &Frame::standard(RPDO + node, image), ANSWER)?;
         }
-        let now = self.start.elapsed();
+        let now = self.port.now();
         let timeout = self.client.poll_timeout().map_or(Duration::ZERO, |at| at.saturating_sub(now));
         let event = self.port.receive(timeout)?;
-        let now = self.start.elapsed();
-        if let Some(Event::Frame(frame)) = event
-            && frame.standard_id() == Some(TPDO + node)
-            && let Ok(image) = <[u8; 8]>::try_from(frame.data())
-        {
-            self.client.handle_input(now, image);
+        let now = self.port.now();
+        let mut booted = false;
+        if let Some(Event::Frame(frame)) = event {
+            booted = is_boot_up(&frame, self.node);
+            if frame.standard_id() == Some(TPDO + node)
+                && let Ok(image) = <[u8; 8]>::try_from(frame.data())
+            {
+                self.client.handle_input(now, image);
+            }
         }
         self.client.handle_timeout(now);
-        Ok(())
+        self.operational &= !booted;
+        Ok(booted)
     }
 }
 
@@ -180,7 +222,8 @@ impl Link for PdoLink {
 
     fn call(&mut self, request: &Request) -> Result<Reply, LinkError> {
         let command = request.command();
-        let began = Instant::now();
+        let end = self.port.now().saturating_add(BUSY);
+        self.operational &= !drain(self.port.as_mut(), self.node)?;
         loop {
             let ticket =
                 self.client.submit(request).map_err(|_| io::Error::from(io::ErrorKind::Interrupted))?;
@@ -188,22 +231,29 @@ impl Link for PdoLink {
                 if let Some(event) = self.client.poll_event() {
                     break event.outcome;
                 }
-                if let Err(error) = self.turn() {
-                    self.client.cancel(ticket);
-                    self.client.poll_event();
-                    return Err(error.into());
-                }
+                let error = match self.turn() {
+                    Ok(false) => continue,
+                    // A drive that has started anew would carry the repeated image out once more.
+                    Ok(true) => LinkError::Restarted { command },
+                    Err(error) => error.into(),
+                };
+                self.client.cancel(ticket);
+                self.client.poll_event();
+                return Err(error);
             };
             return Err(match outcome {
                 Outcome::Done(reply) | Outcome::Refused(reply) => return Ok(reply),
-                Outcome::StillRunning(_) if began.elapsed() < BUSY => continue,
+                Outcome::StillRunning(_) if self.port.now() < end => continue,
                 Outcome::StillRunning(_) => LinkError::StillBusy { command },
                 Outcome::Restarted => LinkError::Restarted { command },
                 Outcome::WrongEcho { expected, found } => {
                     let found = format!("count {found}, {expected} expected");
                     LinkError::WrongEcho { command, found }
                 }
-                _ => LinkError::NoAnswer { command },
+                _ => {
+                    self.operational = false;
+                    LinkError::NoAnswer { command }
+                }
             });
         }
     }

@@ -1,6 +1,8 @@
 //! LinMot drives on an open port: links for the client's side, and a virtual or real drive served.
 
 mod can;
+pub mod curve_file;
+mod lines;
 pub mod transfer;
 
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -8,6 +10,7 @@ use core::time::Duration;
 use std::io;
 use std::time::Instant;
 
+use linmot::code::Command;
 use linmot::drive::Drive;
 use linmot::link::Link;
 use linmot::linrs::{Config, MAX_FRAME, Master, Outcome, Slave, SubmitError};
@@ -22,22 +25,22 @@ use crate::port::Port;
 #[non_exhaustive]
 pub enum LinkError {
     /// Nothing, or nothing complete, came in time.
-    #[error("no answer to {command}; the drive is off, restarting, or has another ID")]
+    #[error("no answer to {command}; the drive is off, restarting, or has another ID{}", unknown(*.command))]
     NoAnswer {
         /// What was asked.
-        command: linmot::code::Command,
+        command: Command,
     },
     /// The drive restarted while the command was under way.
-    #[error("the drive restarted during {command}")]
+    #[error("the drive restarted during {command}{}", unknown(*.command))]
     Restarted {
         /// What was asked.
-        command: linmot::code::Command,
+        command: Command,
     },
     /// Something answered that does not belong to the command.
     #[error("wrong answer to {command}: {found}")]
     WrongEcho {
         /// What was asked.
-        command: linmot::code::Command,
+        command: Command,
         /// What came, in words.
         found: String,
     },
@@ -45,22 +48,27 @@ pub enum LinkError {
     #[error("the drive is still busy with {command}")]
     StillBusy {
         /// What was asked.
-        command: linmot::code::Command,
+        command: Command,
     },
     /// The drive aborted an SDO transfer.
     #[error("{command}: {aborted}")]
     Aborted {
         /// What was asked.
-        command: linmot::code::Command,
+        command: Command,
         /// With which code.
         aborted: linmot::sdo::Aborted,
     },
     /// The carrier has no form for the command.
     #[error("this connection cannot carry {0}")]
-    NotCarried(linmot::code::Command),
+    NotCarried(Command),
     /// The endpoint failed or is gone.
     #[error("the port failed: {0}")]
     Port(#[from] io::Error),
+}
+
+/// What is left open by a command that was not answered.
+fn unknown(command: Command) -> &'static str {
+    if command.is_reading() { "" } else { "; it may have been carried out all the same" }
 }
 
 /// How long a drive that says "busy" is asked again.
@@ -72,7 +80,6 @@ const PAUSE: Duration = Duration::from_millis(20);
 pub struct LinRsLink {
     port: Box<dyn Port>,
     master: Master,
-    start: Instant,
     retries: u8,
 }
 
@@ -86,7 +93,7 @@ impl LinRsLink {
     /// A master on `port` that repeats reads up to `retries` times.
     #[must_use]
     pub fn new(port: Box<dyn Port>, config: Config, retries: u8) -> Self {
-        Self { port, master: Master::new(config), start: Instant::now(), retries }
+        Self { port, master: Master::new(config), retries }
     }
 
     fn once(&mut self, request: &Request) -> Result<Outcome, LinkError> {
@@ -112,14 +119,14 @@ impl LinRsLink {
     }
 
     fn turn(&mut self, buffer: &mut [u8]) -> io::Result<()> {
-        if let Some(bytes) = self.master.poll_transmit(self.start.elapsed()) {
+        if let Some(bytes) = self.master.poll_transmit(self.port.now()) {
             self.port.send(bytes)?;
-            self.master.handle_transmit_done(self.start.elapsed());
+            self.master.handle_transmit_done(self.port.now());
         }
-        let now = self.start.elapsed();
+        let now = self.port.now();
         let timeout = self.master.poll_timeout().map_or(Duration::ZERO, |at| at.saturating_sub(now));
         let len = self.port.receive(buffer, timeout)?;
-        let now = self.start.elapsed();
+        let now = self.port.now();
         self.master.handle_bytes(now, buffer.get(..len).unwrap_or(&[]));
         self.master.handle_timeout(now);
         Ok(())
@@ -131,14 +138,19 @@ impl Link for LinRsLink {
 
     fn call(&mut self, request: &Request) -> Result<Reply, LinkError> {
         let command = request.command();
-        let began = Instant::now();
+        let end = self.port.now().saturating_add(BUSY);
         loop {
             let outcome = self.once(request)?;
             if Master::is_later(&outcome) {
-                if began.elapsed() > BUSY {
+                let again = self.port.now().saturating_add(PAUSE);
+                if again > end {
                     return Err(LinkError::StillBusy { command });
                 }
-                std::thread::sleep(PAUSE);
+                // What still comes belongs to nothing.
+                while self.port.now() < again {
+                    let left = again.saturating_sub(self.port.now());
+                    self.port.receive(&mut [0; MAX_FRAME], left)?;
+                }
                 continue;
             }
             return match outcome {

@@ -2,14 +2,14 @@
 
 use std::io::{self, BufRead, Seek, Write};
 
+use linmot::code::Status;
 use linmot::curve::{IDS, InfoBlock};
 use linmot::link::{Fault, Link, LinkExt};
 use linmot::pvl::{Encoding, Event, LineDecoder, Parser, Problem, Severity, Writer};
 use linmot::request::{Access, List, Memory, Request, Value};
 use linmot::upid::{Incompatible, Layer, TreeIdentity, Upid, Usage};
 
-/// Longest line that is read; what is longer is no PVL file.
-const LINE: u64 = 4096;
+use super::lines::Lines;
 
 /// Why a transfer ended early.
 #[derive(Debug, thiserror::Error)]
@@ -68,21 +68,22 @@ pub fn read<E: From<io::Error>>(
     file: &mut impl BufRead,
     mut sink: impl FnMut(Event) -> Result<(), E>,
 ) -> Result<Encoding, E> {
-    let (mut parser, mut decoder, mut line) = (Parser::new(), LineDecoder::new(), Vec::new());
+    let (mut parser, mut decoder, mut lines) = (Parser::new(), LineDecoder::new(), Lines::new(file));
     let mut result = Ok(());
     loop {
-        line.clear();
-        let len = io::Read::take(&mut *file, LINE).read_until(b'\n', &mut line)?;
+        let line = lines.next_line()?;
         let mut pass = |event| {
             if result.is_ok() {
                 result = sink(event);
             }
         };
-        if len == 0 {
-            parser.finish(&mut pass);
-            return result.map(|()| decoder.encoding());
+        match line {
+            Some((_, line)) => parser.line(&decoder.decode(line), &mut pass),
+            None => {
+                parser.finish(&mut pass);
+                return result.map(|()| decoder.encoding());
+            }
         }
-        parser.line(&decoder.decode(line.strip_suffix(b"\n").unwrap_or(&line)), &mut pass);
         if result.is_err() {
             return result.map(|()| decoder.encoding());
         }
@@ -274,8 +275,8 @@ pub struct Options {
 /// after an error the caller can say how far it came; the same restore then completes it.
 ///
 /// # Errors
-/// [`TransferError::Check`], [`TransferError::Incompatible`] and [`TransferError::Parameters`] before
-/// anything was written; the drive's refusal or silence at any step.
+/// [`TransferError::Check`], [`TransferError::Incompatible`], [`TransferError::Parameters`] and
+/// [`TransferError::CurveSize`] before anything was written; the drive's refusal or silence at any step.
 pub fn restore<L: Link>(
     link: &mut L,
     file: &mut (impl BufRead + Seek),
@@ -286,6 +287,11 @@ pub fn restore<L: Link>(
     summary.check()?;
     summary.check_drive(link)?;
     check_parameters(link, file)?;
+    if !options.delete_curves {
+        for info in &summary.curves {
+            curve_access(link, info)?;
+        }
+    }
     file.rewind()?;
     if !options.dry_run {
         link.ask(Request::Stop)?;
@@ -308,16 +314,7 @@ pub fn restore<L: Link>(
                 progress(done);
             }
             Event::Curve(info) => {
-                let request = Request::StartCurve { access: Access::Get, curve: info.id, info: 0, data: 0 };
-                let access = match link.ask(request) {
-                    Ok(reply) if u32::from(reply.words[2]) == info.data_size() => Access::Modify,
-                    Ok(_) if options.dry_run && options.delete_curves => Access::Add,
-                    Ok(_) => return Err(TransferError::CurveSize(info.id)),
-                    Err(Fault::Refused { reply, .. }) if reply.status == linmot::code::Status::DEFINED => {
-                        Access::Add
-                    }
-                    Err(fault) => return Err(fault.into()),
-                };
+                let access = if options.delete_curves { Access::Add } else { curve_access(link, &info)? };
                 if !options.dry_run {
                     link.start_curve(access, &info)?;
                 }
@@ -348,6 +345,17 @@ pub fn restore<L: Link>(
         link.ask(Request::Start)?;
     }
     Ok(done)
+}
+
+/// How a curve gets into the drive: one that is there is modified, which needs the same size.
+fn curve_access<L: Link>(link: &mut L, info: &InfoBlock) -> Result<Access, TransferError<L::Error>> {
+    let request = Request::StartCurve { access: Access::Get, curve: info.id, info: 0, data: 0 };
+    match link.ask(request) {
+        Ok(reply) if u32::from(reply.words[2]) == info.data_size() => Ok(Access::Modify),
+        Ok(_) => Err(TransferError::CurveSize(info.id)),
+        Err(Fault::Refused { reply, .. }) if reply.status == Status::DEFINED => Ok(Access::Add),
+        Err(fault) => Err(fault.into()),
+    }
 }
 
 /// Every parameter of the file must exist in the drive and be writable there.
@@ -441,7 +449,7 @@ pub fn compare<L: Link>(
                 match link.read(upid, Value::Rom) {
                     Ok(found) if found == value => done.parameters += 1,
                     Ok(drive) => report(Difference::Parameter { upid, file: value, drive }),
-                    Err(Fault::Refused { reply, .. }) if reply.status == linmot::code::Status::UPID => {
+                    Err(Fault::Refused { reply, .. }) if reply.status == Status::UPID => {
                         report(Difference::Missing(upid));
                     }
                     Err(fault) => return Err(fault.into()),

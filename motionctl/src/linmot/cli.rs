@@ -16,7 +16,8 @@ pub(crate) struct Drive {
     /// CANopen node ID, or LinRS ID
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub(crate) node: u8,
-    /// How CAN carries the commands: default SDO, or the configuration module in RPDO 4 and TPDO 4
+    /// How CAN carries the commands: default SDO, or the configuration module in RPDO 4 and TPDO 4, for
+    /// which the node is started (operational)
     #[arg(long, value_enum, default_value_t = Carrier::Sdo)]
     pub(crate) carrier: Carrier,
     /// Checksum of LinRS frames, as the drive's UPID 2080h says
@@ -171,6 +172,8 @@ pub(crate) enum Curve {
         id: u16,
         file: PathBuf,
     },
+    /// A curve file from a motion profile, or from points; needs no drive
+    Build(Build),
     /// RAM to flash; the MC software is stopped meanwhile
     Save {
         #[command(flatten)]
@@ -189,6 +192,112 @@ pub(crate) enum Curve {
         #[arg(long, short, value_name = "F.svg")]
         output: PathBuf,
     },
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ProfileName {
+    /// Velocity is half a sine, as in the manufacturer's example
+    Sine,
+    /// Velocity and acceleration are 0 at both ends, the polynomial of fifth degree
+    MinimumJerk,
+    /// A third each of acceleration, constant velocity, deceleration
+    Trapezoid,
+}
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct Build {
+    /// The file to write, for `add` and `modify`
+    #[arg(long, short, value_name = "F")]
+    pub(crate) output: PathBuf,
+    /// Up to 21 characters
+    #[arg(long, default_value = "")]
+    pub(crate) name: String,
+    #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u16).range(2..=16383))]
+    pub(crate) setpoints: u16,
+    /// Where the motion begins: 12.5mm, 300um, 0.1m
+    #[arg(long, value_name = "POSITION", default_value = "0mm", allow_hyphen_values = true)]
+    pub(crate) from: Quantity,
+    /// Where it ends
+    #[arg(long, value_name = "POSITION", allow_hyphen_values = true, required_unless_present = "points")]
+    pub(crate) to: Option<Quantity>,
+    /// Its shape, over a given length
+    #[arg(long, value_enum, default_value_t = ProfileName::Sine)]
+    pub(crate) profile: ProfileName,
+    /// Its length: 200ms, 0.2s; of a cam in encoder increments: 3600inc
+    #[arg(long, value_name = "LENGTH", required_unless_present_any = ["points", "velocity"])]
+    pub(crate) length: Option<Quantity>,
+    /// In place of shape and length: the fastest way within limits, 1.5m/s or 300mm/s
+    #[arg(long, value_name = "V", conflicts_with_all = ["length", "profile"], requires = "acceleration")]
+    pub(crate) velocity: Option<Quantity>,
+    /// 20m/s2 or 9000mm/s2
+    #[arg(long, value_name = "A", requires = "velocity")]
+    pub(crate) acceleration: Option<Quantity>,
+    /// 1000m/s3; without, the acceleration may jump
+    #[arg(long, value_name = "J", requires = "velocity")]
+    pub(crate) jerk: Option<Quantity>,
+    /// In place of a motion: lines of x in ms and y in mm, cut into equal steps
+    #[arg(long, value_name = "F", conflicts_with_all = ["from", "to", "profile", "length", "velocity"])]
+    pub(crate) points: Option<PathBuf>,
+    /// x of the points is in encoder increments
+    #[arg(long, requires = "points")]
+    pub(crate) cam: bool,
+}
+
+/// A number with its unit, in the units that a curve has: 0.1 µm, 10 µs, seconds of rates.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Quantity {
+    pub(crate) value: f64,
+    pub(crate) kind: Kind,
+}
+
+/// What a quantity measures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Kind {
+    Position,
+    Velocity,
+    Acceleration,
+    Jerk,
+    Time,
+    Increments,
+}
+
+/// Units by their name; the number of a curve's units that each has.
+const UNITS: [(&str, Kind, f64); 15] = [
+    ("um", Kind::Position, 1e1),
+    ("mm", Kind::Position, 1e4),
+    ("m", Kind::Position, 1e7),
+    ("mm/s", Kind::Velocity, 1e4),
+    ("m/s", Kind::Velocity, 1e7),
+    ("mm/s2", Kind::Acceleration, 1e4),
+    ("mm/s^2", Kind::Acceleration, 1e4),
+    ("m/s2", Kind::Acceleration, 1e7),
+    ("m/s^2", Kind::Acceleration, 1e7),
+    ("mm/s3", Kind::Jerk, 1e4),
+    ("m/s3", Kind::Jerk, 1e7),
+    ("m/s^3", Kind::Jerk, 1e7),
+    ("ms", Kind::Time, 1e2),
+    ("s", Kind::Time, 1e5),
+    ("inc", Kind::Increments, 1.0),
+];
+
+impl core::str::FromStr for Quantity {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let digits = text.trim_end_matches(|c: char| !c.is_ascii_digit() && c != '.');
+        // The digit of a unit such as m/s2 is no digit of the number.
+        let digits =
+            digits.split_once(|c: char| c.is_ascii_alphabetic()).map_or(digits, |(number, _)| number);
+        let unit = text.get(digits.len()..).unwrap_or_default().trim();
+        let number = digits.trim().parse::<f64>().ok().filter(|number| number.is_finite());
+        let known = UNITS.iter().find(|(name, ..)| *name == unit);
+        match (number, known) {
+            (Some(number), Some((_, kind, scale))) => Ok(Self { value: number * scale, kind: *kind }),
+            _ => {
+                Err("a number with its unit expected, such as 12.5mm, 200ms, 1.5m/s, 20m/s2, 3600inc".into())
+            }
+        }
+    }
 }
 
 #[derive(Debug, Subcommand)]
@@ -304,9 +413,12 @@ pub(crate) struct SimLinmot {
     /// Serial endpoint to answer LinRS on: pty:LINK, tcp:HOST:PORT or a serial port
     #[arg(long, value_name = "EP", alias = "port", conflicts_with = "can")]
     pub(crate) serial: Option<String>,
-    /// CANopen node ID, or LinRS ID
+    /// CANopen node ID, 1 to 127, 255 waits for one over LSS; or LinRS ID
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub(crate) node: u8,
+    /// CANopen serial number (1018h:04)
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(crate) serial_number: u32,
     /// File for ROM values and flash; absent: in memory
     #[arg(long, value_name = "FILE")]
     pub(crate) state: Option<PathBuf>,

@@ -1,16 +1,19 @@
 //! `motionctl linmot curve`.
 
-use core::fmt::Write;
+use core::fmt::Write as _;
+use std::fs::File;
+use std::io::{BufReader, BufWriter, Write as _};
 use std::path::Path;
 
 use linmot::curve::{IDS, InfoBlock, ObjectType, Unit};
 use linmot::link::LinkExt;
 use linmot::request::{Access, Request};
+use motion_io::linmot::curve_file::{self, CurveFileError};
 use serde_json::{Value, json};
 
 use super::cli::{Curve, Drive};
 use super::connect::{AnyLink, connect};
-use super::{curve_file, stopped, text};
+use super::{build, stopped, text};
 use crate::cli::Global;
 use crate::exit::Exit;
 use crate::output::Output;
@@ -20,7 +23,7 @@ pub(super) fn run(out: &Output, global: &Global, command: &Curve) -> Result<(), 
         Curve::List { drive } => list(out, global, drive),
         Curve::Get { drive, id, output } => {
             let (info, setpoints) = read(out, &mut connect(global, drive)?, *id)?;
-            curve_file::write(output, &info, &setpoints)?;
+            save(output, &info, &setpoints)?;
             told(out, &info, &output.display().to_string())
         }
         Curve::Plot { drive, id, output } => {
@@ -29,6 +32,7 @@ pub(super) fn run(out: &Output, global: &Global, command: &Curve) -> Result<(), 
             std::fs::write(output, svg(&info, &setpoints)).map_err(|error| Exit::file(&name, &error))?;
             told(out, &info, &name)
         }
+        Curve::Build(arguments) => build::run(out, global, arguments),
         Curve::Add { drive, id, file } => write(out, global, drive, Access::Add, *id, file),
         Curve::Modify { drive, id, file } => write(out, global, drive, Access::Modify, *id, file),
         Curve::Save { drive } => {
@@ -55,6 +59,24 @@ pub(super) fn run(out: &Output, global: &Global, command: &Curve) -> Result<(), 
     }
 }
 
+pub(super) fn save(path: &Path, info: &InfoBlock, setpoints: &[i32]) -> Result<(), Exit> {
+    let write = || -> std::io::Result<()> {
+        let mut file = BufWriter::new(File::create(path)?);
+        curve_file::write(&mut file, info, setpoints)?;
+        file.flush()
+    };
+    write().map_err(|error| Exit::file(&path.display().to_string(), &error))
+}
+
+fn load(path: &Path, id: u16) -> Result<(InfoBlock, Vec<i32>), Exit> {
+    let name = path.display().to_string();
+    let file = File::open(path).map_err(|error| Exit::file(&name, &error))?;
+    curve_file::read(&mut BufReader::new(file), id).map_err(|error| match error {
+        CurveFileError::Io(error) => Exit::file(&name, &error),
+        other => Exit::check(format!("{name}: {other}")),
+    })
+}
+
 pub(super) fn to_json(info: &InfoBlock) -> Value {
     json!({
         "id": info.id,
@@ -68,7 +90,7 @@ pub(super) fn to_json(info: &InfoBlock) -> Value {
     })
 }
 
-fn describe(info: &InfoBlock) -> String {
+pub(super) fn describe(info: &InfoBlock) -> String {
     let kind = match info.object_type {
         ObjectType::POSITION_TIME => format!("{} ms", f64::from(info.x_length) / 100.0),
         ObjectType::POSITION_ENCODER => format!("cam, {} increments", info.x_length),
@@ -121,7 +143,7 @@ fn write(
     id: u16,
     file: &Path,
 ) -> Result<(), Exit> {
-    let (info, setpoints) = curve_file::read(file, id)?;
+    let (info, setpoints) = load(file, id)?;
     if global.dry_run {
         out.say(&format!("would write {}", describe(&info)));
         return Ok(());

@@ -1,9 +1,9 @@
 //! `motionctl linmot …`: LinMot drives; `motionctl sim linmot`: a virtual one.
 
+mod build;
 pub(crate) mod cli;
 mod connect;
 mod curve;
-mod curve_file;
 mod params;
 mod pvl;
 pub(crate) mod sim;

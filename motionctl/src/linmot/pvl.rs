@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::{BufReader, BufWriter, Write};
 use std::path::Path;
 
+use linmot::link::Fault;
 use linmot::pvl::{Encoding, Severity};
 use motion_io::linmot::LinkError;
 use motion_io::linmot::transfer::{self, Difference, Options, Progress, Summary, TransferError};
@@ -106,16 +107,21 @@ fn restore(
     let done = done.map_err(|error| {
         let before = matches!(
             error,
-            TransferError::Check { .. } | TransferError::Incompatible(_) | TransferError::Parameters(_)
+            TransferError::Check { .. }
+                | TransferError::Incompatible(_)
+                | TransferError::Parameters(_)
+                | TransferError::CurveSize(_)
         );
+        let refused = matches!(error, TransferError::Drive(Fault::Refused { .. }));
         let exit = failed(path, error);
         if before {
             return exit.context("nothing was written");
         }
         let Progress { parameters, written, curves, .. } = last;
+        let remedy = if refused { "correct what it refuses and restore again" } else { "the same restore completes it" };
         exit.context(&format!(
             "incomplete: {parameters} parameters ({written} of them written) and {curves} curves are as in the file, \
-             curves in RAM only, the MC software may be stopped; the same restore completes it"
+             curves in RAM only, the MC software may be stopped; {remedy}"
         ))
     })?;
     let Progress { parameters, written, curves, setpoints } = done;

@@ -1,0 +1,201 @@
+//! `motionctl linmot curve build`: a curve file from a motion profile, or from points.
+
+use std::fs::File;
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+
+use linmot::curve::{CurveError, InfoBlock, Profile, Unit, resample, rounded};
+use linmot::pvl::Encoding;
+use motion_core::trajectory::{self, Limits, State};
+use serde_json::json;
+
+use super::cli::{Build, Kind, ProfileName, Quantity};
+use super::curve;
+use crate::cli::Global;
+use crate::exit::Exit;
+use crate::output::Output;
+
+/// Units of x in a second.
+const SECOND: f64 = 1e5;
+/// Curves get their ID when they are added.
+const ANY_ID: u16 = 1;
+
+pub(super) fn run(out: &Output, global: &Global, arguments: &Build) -> Result<(), Exit> {
+    let (length, cam, setpoints) = setpoints(arguments)?;
+    let build = if cam { InfoBlock::cam } else { InfoBlock::position_over_time };
+    let mut info = build(ANY_ID, "", length, arguments.setpoints).map_err(refused)?;
+    let name = Encoding::Windows1252.encode(&arguments.name);
+    if name.len() >= info.name.len() {
+        return Err(refused(CurveError::Name(name.len())));
+    }
+    info.name.iter_mut().zip(name).for_each(|(room, byte)| *room = byte);
+    let file = arguments.output.display().to_string();
+    let fastest = fastest(&info, &setpoints);
+    let speed = fastest.map_or(String::new(), |speed| format!(", up to {speed:.4} m/s"));
+    let text = curve::describe(&info);
+    let text = text.trim_start().trim_start_matches(|c: char| c.is_ascii_digit()).trim_start();
+    if global.dry_run {
+        out.say(&format!("would write {text}{speed} to {file}"));
+        return Ok(());
+    }
+    curve::save(&arguments.output, &info, &setpoints)?;
+    let document = json!({ "curve": curve::to_json(&info), "file": file, "fastest": fastest });
+    out.document(document, || println!("{text}{speed}, written to {file}"));
+    Ok(())
+}
+
+fn refused(error: CurveError) -> Exit {
+    Exit::usage(error.to_string())
+}
+
+/// x length, whether it is in encoder increments, and the setpoints.
+fn setpoints(arguments: &Build) -> Result<(u32, bool, Vec<i32>), Exit> {
+    let count = arguments.setpoints;
+    if let Some(path) = &arguments.points {
+        let points = points(path)?;
+        // The caller's x is in ms.
+        let scale = if arguments.cam { 1.0 } else { SECOND / 1000.0 };
+        let ends = points.first().zip(points.last());
+        let length = ends.map_or(0.0, |(first, last)| (last.0 - first.0) * scale);
+        let setpoints = (0..count).filter_map(|number| resample(&points, number, count)).collect();
+        return Ok((whole("the points' length", length)?, arguments.cam, setpoints));
+    }
+    let from = of(Kind::Position, "--from", arguments.from)?;
+    let to = arguments.to.map_or(Ok(from), |to| of(Kind::Position, "--to", to))?;
+    for (option, position) in [("--from", from), ("--to", to)] {
+        if rounded(position) != position.round() as i32 || position.abs() > f64::from(i32::MAX) {
+            return Err(Exit::usage(format!("{option}: -214748mm to 214748mm expected")));
+        }
+    }
+    if let Some(velocity) = arguments.velocity {
+        return within_limits(arguments, velocity, (from, to));
+    }
+    let length = arguments.length.ok_or_else(|| Exit::usage("--length is missing"))?;
+    let cam = length.kind == Kind::Increments;
+    let length = if cam { length.value } else { of(Kind::Time, "--length", length)? };
+    let profile = match arguments.profile {
+        ProfileName::Sine => Profile::Sine,
+        ProfileName::MinimumJerk => Profile::MinimumJerk,
+        ProfileName::Trapezoid => Profile::Trapezoid,
+    };
+    let (start, end) = (rounded(from), rounded(to));
+    let setpoints = (0..count).map(|number| profile.setpoint(start, end, number, count)).collect();
+    Ok((whole("--length", length)?, cam, setpoints))
+}
+
+fn within_limits(
+    arguments: &Build,
+    velocity: Quantity,
+    (from, to): (f64, f64),
+) -> Result<(u32, bool, Vec<i32>), Exit> {
+    let velocity = of(Kind::Velocity, "--velocity", velocity)?;
+    let acceleration = arguments.acceleration.ok_or_else(|| Exit::usage("--acceleration is missing"))?;
+    let acceleration = of(Kind::Acceleration, "--acceleration", acceleration)?;
+    let jerk = arguments.jerk.map_or(Ok(f64::INFINITY), |jerk| of(Kind::Jerk, "--jerk", jerk))?;
+    let limits = Limits::new(velocity, acceleration, acceleration, jerk)
+        .map_err(|error| Exit::usage(format!("in 0.1 um and seconds: {error}")))?;
+    let mut way = trajectory::Profile::at_rest(from);
+    way.move_to(&State::at_rest(from), &limits, to).map_err(|error| Exit::usage(error.to_string()))?;
+    // The whole 10 us that the way fits into but for rounding; the drive runs that much slower.
+    let length = whole("the motion's length", (way.duration() * SECOND - 1e-6).ceil())?;
+    let intervals = f64::from(arguments.setpoints - 1);
+    let at = |number: u16| way.at(way.duration() * f64::from(number) / intervals).position;
+    Ok((length, false, (0..arguments.setpoints).map(|number| rounded(at(number))).collect()))
+}
+
+fn of(kind: Kind, option: &str, quantity: Quantity) -> Result<f64, Exit> {
+    let expected = match kind {
+        Kind::Position => "a position in um, mm or m",
+        Kind::Velocity => "a velocity in mm/s or m/s",
+        Kind::Acceleration => "an acceleration in mm/s2 or m/s2",
+        Kind::Jerk => "a jerk in mm/s3 or m/s3",
+        Kind::Time | Kind::Increments => "a time in ms or s, or increments in inc",
+    };
+    if quantity.kind == kind {
+        Ok(quantity.value)
+    } else {
+        Err(Exit::usage(format!("{option}: {expected} expected")))
+    }
+}
+
+/// An x length: 1 to 2^32 - 1 of its units.
+fn whole(what: &str, length: f64) -> Result<u32, Exit> {
+    let length = length.round();
+    if (1.0..=f64::from(u32::MAX)).contains(&length) {
+        Ok(length as u32)
+    } else {
+        Err(Exit::usage(format!(
+            "{what}: 0.01 ms to 42949672.95 ms, or 1 to 4294967295 increments, expected"
+        )))
+    }
+}
+
+/// The greatest step between two setpoints of a curve over time, in m/s.
+fn fastest(info: &InfoBlock, setpoints: &[i32]) -> Option<f64> {
+    let step = f64::from(info.x_length) / SECOND / f64::from(info.setpoints - 1);
+    let steps = setpoints.iter().zip(setpoints.iter().skip(1));
+    let widest = steps.map(|(left, right)| (f64::from(*right) - f64::from(*left)).abs()).fold(0.0, f64::max);
+    (info.x_unit == Unit::TIME).then_some(widest / 1e7 / step)
+}
+
+/// Lines of x and y; y comes in mm and goes in 0.1 µm. x ascends.
+fn points(path: &Path) -> Result<Vec<(f64, f64)>, Exit> {
+    let name = path.display().to_string();
+    let file = File::open(path).map_err(|error| Exit::file(&name, &error))?;
+    let mut points: Vec<(f64, f64)> = Vec::new();
+    for (number, line) in (1..).zip(BufReader::new(file).lines()) {
+        let line = line.map_err(|error| Exit::file(&format!("{name}: line {number}"), &error))?;
+        let line = line.trim();
+        if line.is_empty() || line.starts_with('#') {
+            continue;
+        }
+        let shown: String = line.chars().take(40).collect();
+        let wrong = |expected: &str| {
+            Exit::check(format!("{name}: line {number}: {expected} expected, {shown:?} found"))
+        };
+        let numbers: Option<Vec<f64>> = line
+            .split([',', ';', '\t', ' '])
+            .filter(|word| !word.is_empty())
+            .map(|word| word.parse().ok().filter(|number: &f64| number.is_finite()))
+            .collect();
+        let Some(&[x, y]) = numbers.as_deref() else { return Err(wrong("two numbers, x and y in mm,")) };
+        if points.last().is_some_and(|last| last.0 >= x) {
+            return Err(wrong("an x above the one before"));
+        }
+        let y = y * 1e4;
+        if y.abs() > f64::from(i32::MAX) {
+            return Err(wrong("a y of -214748 to 214748 mm"));
+        }
+        points.push((x, y));
+    }
+    if points.len() < 2 {
+        return Err(Exit::check(format!("{name}: {} points, at least 2 expected", points.len())));
+    }
+    Ok(points)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantities_have_units() {
+        for (text, value, kind) in [
+            ("12.5mm", 125_000.0, Kind::Position),
+            ("-300um", -3000.0, Kind::Position),
+            ("0.1m", 1e6, Kind::Position),
+            ("1.5m/s", 1.5e7, Kind::Velocity),
+            ("20 m/s2", 2e8, Kind::Acceleration),
+            ("20m/s^2", 2e8, Kind::Acceleration),
+            ("1000m/s3", 1e10, Kind::Jerk),
+            ("200ms", 20_000.0, Kind::Time),
+            ("0.2s", 20_000.0, Kind::Time),
+            ("3600inc", 3600.0, Kind::Increments),
+        ] {
+            assert_eq!(text.parse(), Ok(Quantity { value, kind }), "{text}");
+        }
+        for text in ["", "5", "mm", "5cm", "1e400mm", "5 mm mm", "m/s2", "--5mm", "5mm2"] {
+            assert!(text.parse::<Quantity>().is_err(), "{text}");
+        }
+    }
+}
