@@ -154,6 +154,27 @@ fn refusals_are_named() {
             edit(&bench.path("X.pvl"), from, to);
             linmot.run(&["--yes", "pvl", "restore", "X.pvl"]).ends(1).says(words);
         }
+        // A value that the drive refuses: what was written before it is said, and put right.
+        std::fs::copy(bench.path("B.pvl"), bench.path("X.pvl")).unwrap();
+        edit(&bench.path("X.pvl"), "119Eh, 00001F40h", "119Eh, 00000001h");
+        edit(&bench.path("X.pvl"), "20A0h, 00000001h", "20A0h, 000000FFh");
+        linmot
+            .run(&["--yes", "pvl", "restore", "X.pvl"])
+            .ends(4)
+            .says("incomplete: 32 parameters (1 of them written) and 0 curves are as in the file")
+            .says("correct what it refuses and restore again")
+            .says("UPID 20A0h")
+            .says("range error");
+        linmot.run(&["--yes", "pvl", "restore", "B.pvl"]).ends(0).says("1 of them written");
+        // A curve of another size, which only deleting makes room for.
+        linmot.run(&["curve", "delete-all"]).ends(0);
+        linmot.run(&["curve", "add", "5", "C.csv"]).ends(0);
+        linmot
+            .run(&["--yes", "pvl", "restore", "B.pvl"])
+            .ends(1)
+            .says("nothing was written: curve 5 is in the drive with another number of setpoints");
+        linmot.run(&["--yes", "pvl", "restore", "B.pvl", "--replace-curves"]).ends(0);
+        linmot.run(&["pvl", "compare", "B.pvl"]).ends(0);
         drive.kill();
         let gone = linmot.run(&["--timeout", "0.2", "params", "get", "13A2h"]);
         assert!([3, 5].contains(&gone.0.status.code().unwrap()), "{}", gone.stderr());
@@ -171,4 +192,90 @@ fn files_are_checked_without_a_drive() {
     assert_eq!((diagnostics.len(), diagnostics[0]["line"].as_u64()), (1, Some(9)));
     assert_eq!(diagnostics[0]["severity"], "error");
     bench.run(&["linmot", "pvl", "check", "none.pvl"]).ends(5);
+    std::fs::write(bench.path("L.pvl"), vec![b'x'; 5000]).unwrap();
+    bench.run(&["linmot", "pvl", "check", "L.pvl"]).ends(5).says("L.pvl: line 1 is longer than 4096 bytes");
+    // Before the endpoint is opened.
+    for (content, words) in [
+        (
+            "# length_ms=1\n0\nfive\n",
+            "line 3: a setpoint, -2147483648 to 2147483647, expected, \"five\" found",
+        ),
+        ("0\n1\n", "line 1: # name=… length_ms=… unit=0.1um expected, \"0\" found"),
+        ("# length_ms=1\n0\n", "1 setpoints, 2 to 16383 expected"),
+    ] {
+        std::fs::write(bench.path("C.csv"), content).unwrap();
+        bench.run(&["linmot", "curve", "add", "1", "C.csv", "--can", "slcan:NONE"]).ends(1).says(words);
+    }
+}
+
+/// Setpoints of a file that `curve build` wrote.
+fn setpoints(bench: &Bench, file: &str) -> Vec<i32> {
+    let text = std::fs::read_to_string(bench.path(file)).unwrap();
+    text.lines().skip(1).map(|line| line.parse().unwrap()).collect()
+}
+
+#[test]
+fn curves_are_built_without_a_drive() {
+    let bench = Bench::new();
+    let build = |arguments: &[&str]| {
+        bench.run(&[&["linmot", "curve", "build", "--output", "C.csv"], arguments].concat())
+    };
+    // Manual B, figure 13.
+    let example = ["--name", "Example_Curve", "--to", "100mm", "--length", "200ms", "--setpoints", "10"];
+    build(&example).ends(0).says("10 setpoints, 200 ms");
+    let text = std::fs::read_to_string(bench.path("C.csv")).unwrap();
+    assert!(text.starts_with("# name=Example_Curve length_ms=200 unit=0.1um "), "{text}");
+    assert_eq!(text.lines().skip(1).collect::<Vec<_>>(), CURVE.lines().skip(1).collect::<Vec<_>>());
+    // 50 ms and 25 mm up to 1 m/s, 50 ms at that speed, 50 ms down.
+    let limits = ["--to", "100mm", "--velocity", "1m/s", "--acceleration", "20m/s2", "--setpoints", "151"];
+    build(&limits).ends(0).says("151 setpoints, 150 ms, up to 1.0000 m/s");
+    let found = setpoints(&bench, "C.csv");
+    assert_eq!(
+        [found[0], found[10], found[50], found[75], found[100], found[150]],
+        [0, 10_000, 250_000, 500_000, 750_000, 1_000_000]
+    );
+    build(&[
+        "--from",
+        "-1mm",
+        "--to",
+        "1mm",
+        "--length",
+        "3600inc",
+        "--profile",
+        "trapezoid",
+        "--setpoints",
+        "7",
+    ])
+    .ends(0)
+    .says("cam, 3600 increments");
+    assert_eq!(setpoints(&bench, "C.csv"), [-10_000, -8750, -5000, 0, 5000, 8750, 10_000]);
+    std::fs::write(bench.path("P.csv"), "# ms; mm\n0; 0\n10; 1\n40; -2\n").unwrap();
+    build(&["--points", "P.csv", "--setpoints", "5"]).ends(0).says("5 setpoints, 40 ms");
+    assert_eq!(setpoints(&bench, "C.csv"), [0, 10_000, 0, -10_000, -20_000]);
+    for (content, words) in [
+        ("0 0\n0 1\n", "line 2: an x above the one before expected, \"0 1\" found"),
+        ("0 0\n5\n", "line 2: two numbers, x and y in mm, expected, \"5\" found"),
+        ("0 0\n5 five\n", "line 2"),
+        ("0 0\n", "1 points, at least 2 expected"),
+    ] {
+        std::fs::write(bench.path("P.csv"), content).unwrap();
+        build(&["--points", "P.csv"]).ends(1).says(words);
+    }
+    build(&["--to", "50", "--length", "1s"]).ends(2).says("a number with its unit expected");
+    build(&["--to", "50mm", "--length", "1mm"]).ends(2).says("--length: a time in ms or s");
+    build(&["--to", "500m", "--length", "1s"]).ends(2).says("--to: -214748mm to 214748mm expected");
+}
+
+#[test]
+fn a_drive_on_can_waits_for_its_node_id_and_is_guarded() {
+    let bench = Bench::new();
+    let sim = ["sim", "linmot", "--can=slcan-pty:LINE", "--node", "255", "--serial-number", "77"];
+    let _drive = bench.device(&sim);
+    let can = ["--can", "slcan:LINE"];
+    let run = |arguments: &[&str]| bench.run(&[arguments, &can].concat());
+    run(&["can", "lss", "set-node", "5"]).ends(0);
+    run(&["can", "sdo", "read", "5", "0x1018:4", "--type", "u32"]).ends(0).says("77");
+    run(&["can", "sdo", "read", "5", "0x1008", "--type", "string"]).ends(0).says("Virtual LinMot drive");
+    run(&["can", "guard", "5", "--for", "0.3"]).ends(0).says("pre-operational");
+    run(&["linmot", "params", "get", "13A2h", "--node", "5"]).ends(0).says("default 10");
 }

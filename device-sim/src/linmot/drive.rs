@@ -112,6 +112,11 @@ impl VirtualDrive {
         self.writes
     }
 
+    /// Changes how long what begins from now on takes.
+    pub const fn set_times(&mut self, times: Times) {
+        self.times = times;
+    }
+
     /// Adds an error to the log.
     pub fn log_error(&mut self, error: LoggedError) {
         self.occurred = self.occurred.wrapping_add(1);

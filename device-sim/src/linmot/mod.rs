@@ -5,6 +5,7 @@
 mod drive;
 mod flash;
 mod node;
+mod objects;
 mod tree;
 
 pub use drive::{Times, VirtualDrive};

@@ -1,153 +1,147 @@
-//! The drive on a CAN bus: boot-up, NMT resets, the configuration service by SDO, and the
-//! configuration module in a PDO pair.
+//! The drive on a CAN bus: a CANopen slave with guarding, heartbeat and LSS, whose objects from 2000h
+//! on are the configuration service, and the configuration module in a PDO pair.
 
 use core::time::Duration;
 use std::collections::VecDeque;
 
-use linmot::drive::{Drive, Module};
-use linmot::module::{RPDO, TPDO};
-use linmot::sdo::{Access, Answer, Server, abort};
-use pdo::{Frame, NodeId};
+use canopen_master::lss::{BitTiming, Identity};
+use canopen_master::slave::{Config, Event, Slave};
+use linmot::drive::Drive;
+use pdo::{Frame, NodeId, cob};
 
 use super::VirtualDrive;
+use super::objects::DriveObjects;
 use crate::can::Node;
 
-/// COB-IDs (CiA 301).
-const NMT: u16 = 0x000;
-const SDO_ANSWER: u16 = 0x580;
-const SDO_REQUEST: u16 = 0x600;
-const BOOT_UP: u16 = 0x700;
-/// NMT command specifiers that reset the node and its communication.
-const RESETS: [u8; 2] = [0x81, 0x82];
 /// Vendor ID of the manufacturer, 1018h:01.
 const VENDOR: u32 = 0x156;
+/// 1018h:02 of the virtual drive; project-defined.
+const PRODUCT: u32 = 0x1250;
+/// Command specifier of the answer that begins or ends a download (CiA 301, 7.2.4.3.3).
+const DOWNLOADED: u8 = 0x60;
 
 /// A virtual drive as a station of a bus.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct CanDrive {
-    /// The drive.
-    pub drive: VirtualDrive,
-    node: NodeId,
-    sdo: Server,
-    module: Module,
+    slave: Slave<DriveObjects>,
     /// The restart under way ends with a boot-up message.
     away: bool,
     out: VecDeque<Frame>,
 }
 
 impl CanDrive {
-    /// A drive that has just been switched on: its boot-up message goes first.
+    /// A drive that has just been switched on: its boot-up message goes first. Without an address it
+    /// waits for one over LSS. `serial`: 1018h:04.
     #[must_use]
-    pub fn new(drive: VirtualDrive, node: NodeId) -> Self {
-        let mut can = Self {
-            drive,
-            node,
-            sdo: Server::new(),
-            module: Module::new(),
-            away: false,
-            out: VecDeque::new(),
-        };
-        can.boot_up();
+    pub fn new(drive: VirtualDrive, node: Option<NodeId>, serial: u32) -> Self {
+        let identity = Identity { vendor: VENDOR, product: PRODUCT, revision: 1, serial };
+        let rates: Vec<_> = (0..=8).filter_map(BitTiming::from_index).collect();
+        let config = Config { bit_rates: &rates, ..Config::new(identity, node) };
+        let slave = Slave::new(&config, DriveObjects::new(drive, identity));
+        let mut can = Self { slave, away: false, out: VecDeque::new() };
+        can.boot(Duration::ZERO);
         can
+    }
+
+    /// The drive.
+    #[must_use]
+    pub const fn drive(&self) -> &VirtualDrive {
+        self.slave.objects().drive()
+    }
+
+    /// The drive, to let something happen to it.
+    pub const fn drive_mut(&mut self) -> &mut VirtualDrive {
+        self.slave.objects_mut().drive_mut()
+    }
+
+    /// Its address; `None` while it waits for one.
+    #[must_use]
+    pub const fn node(&self) -> Option<NodeId> {
+        self.slave.node()
     }
 
     /// Power fails and comes back.
     pub fn power_cycle(&mut self, now: Duration) {
         self.out.clear();
-        self.drive.power_cycle(now);
+        self.drive_mut().power_cycle(now);
+        self.away = true;
         self.settle(now);
     }
 
-    fn id(&self, base: u16) -> u16 {
-        base + u16::from(self.node.raw())
+    fn boot(&mut self, now: Duration) {
+        self.slave.objects_mut().reset_communication();
+        self.slave.boot(now);
+        // Only now a node ID that LSS has given is valid, and objects depend on it.
+        let node = self.slave.node();
+        if self.slave.objects_mut().set_node(node) {
+            self.slave.boot(now);
+        }
     }
 
-    fn boot_up(&mut self) {
-        self.out.push_back(Frame::standard(self.id(BOOT_UP), [0]));
-    }
-
+    /// What has happened takes effect; a drive that restarts falls silent when its answer has gone.
     fn settle(&mut self, now: Duration) {
-        self.drive.advance(now);
-        let restarting = self.drive.is_restarting(now);
+        self.drive_mut().advance(now);
+        while let Some(event) = self.slave.poll_event() {
+            match event {
+                Event::ResetNode => self.drive_mut().restart(now),
+                Event::ResetCommunication => self.boot(now),
+                // The store is this process's memory, and a virtual bus has one bit rate.
+                Event::Lss(canopen_master::lss::Action::Store { .. }) => self.slave.stored(Ok(())),
+                _ => {}
+            }
+        }
+        let restarting = self.drive().is_restarting(now);
+        if restarting && !self.away {
+            while let Some(frame) = self.next_frame(now) {
+                self.out.push_back(frame);
+            }
+        }
         if self.away && !restarting {
-            self.boot_up();
+            self.slave.objects_mut().restarted();
+            self.boot(now);
         }
         self.away = restarting;
-        self.module.handle_timeout(now, &self.drive);
     }
 
-    /// Objects beside the configuration service: device type and identity.
-    fn object(&self, access: &Access) -> Answer {
-        let value = match (access.index, access.sub) {
-            (0x1000, 0) => 0,
-            (0x1001, 0) => 0,
-            (0x1018, 0) => 4,
-            (0x1018, 1) => VENDOR,
-            (0x1018, 2..=4) => 0,
-            (0x1018, _) => return Answer::Abort(abort::NO_SUB_INDEX),
-            _ => return Answer::Abort(abort::NO_OBJECT),
-        };
-        match access.write {
-            Some(_) => Answer::Abort(abort::READ_ONLY),
-            None => Answer::Read(value.to_le_bytes()),
+    fn next_frame(&mut self, now: Duration) -> Option<Frame> {
+        let frame = self.slave.poll_transmit(now)?;
+        let answer = self.slave.node().map(|node| cob::SDO_RESPONSE + u16::from(node.raw()));
+        // The documents have the result of a command in an answer's bytes that CiA 301 reserves.
+        if frame.standard_id() == answer
+            && let Some(&[DOWNLOADED, low, high, sub, ..]) = frame.data().first_chunk::<8>()
+            && let Some([a, b, c, d]) = self.slave.objects_mut().take_result()
+        {
+            return Some(Frame::standard(frame.standard_id()?, [DOWNLOADED, low, high, sub, a, b, c, d]));
         }
-    }
-
-    fn sdo(&mut self, now: Duration, telegram: [u8; 8]) {
-        let [command, low, high, sub, ..] = telegram;
-        let index = u16::from_le_bytes([low, high]);
-        let answer = match Access::parse(telegram) {
-            // An abort of the client needs no answer.
-            None if command == 0x80 => None,
-            None => Some(Answer::Abort(abort::COMMAND)),
-            Some(access) if Server::serves(access.index) => self.sdo.execute(now, &access, &mut self.drive),
-            Some(access) => Some(self.object(&access)),
-        };
-        if let Some(answer) = answer {
-            self.out.push_back(Frame::standard(self.id(SDO_ANSWER), answer.encode(index, sub)));
-        }
+        Some(frame)
     }
 }
 
 impl Node for CanDrive {
     fn handle_frame(&mut self, now: Duration, frame: &Frame) {
         self.settle(now);
-        if self.drive.is_restarting(now) || frame.is_remote() {
-            return;
+        if !self.away {
+            self.slave.objects_mut().set_time(now);
+            self.slave.handle_frame(now, frame);
+            self.settle(now);
         }
-        let Some(id) = frame.standard_id() else { return };
-        match (id, frame.data()) {
-            (NMT, [command, node]) if RESETS.contains(command) && [0, self.node.raw()].contains(node) => {
-                self.drive.restart(now);
-            }
-            (id, data) if id == self.id(SDO_REQUEST) => {
-                if let Ok(telegram) = <[u8; 8]>::try_from(data) {
-                    self.sdo(now, telegram);
-                }
-            }
-            (id, data) if id == self.id(RPDO) => {
-                if let Ok(image) = <[u8; 8]>::try_from(data) {
-                    self.module.handle_output(now, image, &mut self.drive);
-                }
-            }
-            _ => {}
-        }
-        self.settle(now);
     }
 
     fn handle_timeout(&mut self, now: Duration) {
         self.settle(now);
+        if !self.away {
+            self.slave.objects_mut().set_time(now);
+            self.slave.handle_timeout(now);
+            self.settle(now);
+        }
     }
 
-    fn poll_transmit(&mut self, _now: Duration) -> Option<Frame> {
-        if let Some(frame) = self.out.pop_front() {
-            return Some(frame);
-        }
-        let image = self.module.poll_transmit()?;
-        Some(Frame::standard(self.id(TPDO), image))
+    fn poll_transmit(&mut self, now: Duration) -> Option<Frame> {
+        self.out.pop_front().or_else(|| if self.away { None } else { self.next_frame(now) })
     }
 
     fn poll_timeout(&self) -> Option<Duration> {
-        self.drive.poll_timeout()
+        let slave = if self.away { None } else { self.slave.poll_timeout() };
+        [slave, self.drive().poll_timeout()].into_iter().flatten().min()
     }
 }

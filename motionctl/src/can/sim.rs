@@ -21,24 +21,25 @@ const STEP: Duration = Duration::from_millis(100);
 /// `--node 255`.
 const NO_NODE: u8 = 255;
 
-fn node(arguments: &SimNode) -> Result<Option<NodeId>, Exit> {
-    if arguments.node == NO_NODE { Ok(None) } else { node_id(arguments.node).map(Some) }
+/// The address of a virtual node; `None` waits for one over LSS.
+pub(crate) fn address(node: u8) -> Result<Option<NodeId>, Exit> {
+    if node == NO_NODE { Ok(None) } else { node_id(node).map(Some) }
 }
 
 pub(crate) fn drive(out: &Output, global: &Global, arguments: &SimNode) -> Result<(), Exit> {
-    let device = Ld2000::node(node(arguments)?, arguments.serial_number);
+    let device = Ld2000::node(address(arguments.node)?, arguments.serial_number);
     run(out, global, arguments, "drive", device)
 }
 
 pub(crate) fn io(out: &Output, global: &Global, arguments: &SimIo) -> Result<(), Exit> {
-    let device = RemoteIo::node(node(&arguments.node)?, arguments.node.serial_number, arguments.wired);
+    let device = RemoteIo::node(address(arguments.node.node)?, arguments.node.serial_number, arguments.wired);
     run(out, global, &arguments.node, "io", device)
 }
 
 pub(crate) fn file(out: &Output, global: &Global, arguments: &SimFile) -> Result<(), Exit> {
     let name = arguments.eds.display().to_string();
     let bytes = std::fs::read(&arguments.eds).map_err(|error| Exit::file(&name, &error))?;
-    let device = FileNode::node(&bytes, node(&arguments.node)?, arguments.node.serial_number)
+    let device = FileNode::node(&bytes, address(arguments.node.node)?, arguments.node.serial_number)
         .map_err(|error| Exit::file(&name, &error))?;
     run(out, global, &arguments.node, "node", device)
 }

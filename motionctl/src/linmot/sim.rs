@@ -12,7 +12,6 @@ use motion_io::can::Driver;
 use motion_io::endpoint::{CanEndpoint, Endpoint, EndpointError};
 use motion_io::linmot::serve_linrs;
 use motion_io::port::{Role, open};
-use pdo::NodeId;
 use serde_json::json;
 
 use super::cli::SimLinmot;
@@ -44,14 +43,14 @@ pub(crate) fn run(out: &Output, arguments: &SimLinmot) -> Result<(), Exit> {
     let usage = |error: EndpointError| Exit::usage(error.to_string());
     if let Some(can) = &arguments.can {
         let endpoint: CanEndpoint = can.parse().map_err(usage)?;
-        let node = NodeId::new(arguments.node).map_err(|error| Exit::usage(format!("--node: {error}")))?;
+        let node = crate::can::sim::address(arguments.node)?;
         let port = motion_io::can::open(&endpoint).map_err(|error| Exit::trouble(error.to_string()))?;
-        let (mut driver, mut node) = (Driver::new(port), CanDrive::new(drive, node));
+        let (mut driver, mut node) = (Driver::new(port), CanDrive::new(drive, node, arguments.serial_number));
         ready(can);
         while !stop.load(Ordering::Relaxed) {
             let limit = driver.now().saturating_add(TURN);
             driver.turn(&mut node, limit, |_, _, _| ()).map_err(|error| Exit::file(can, &error))?;
-            keep(&node.drive).map_err(|error| Exit::file("the state file", &error))?;
+            keep(node.drive()).map_err(|error| Exit::file("the state file", &error))?;
         }
         return Ok(());
     }
