@@ -1,12 +1,13 @@
 //! LinMot files, blocks and telegrams.
 
-use linmot::curve::{INFO_WORDS, InfoBlock, resample, sine};
+use linmot::curve::{INFO_WORDS, InfoBlock, Profile, resample};
 use linmot::linrs::{self, Checksum, Decoder, MAX_FRAME};
 use linmot::module::{Input as ModuleInput, Output};
 use linmot::pvl::{Event, LineDecoder, Parser, Severity, Writer};
 use linmot::request::Request;
-use linmot::sdo::{Access, Answer};
-use linmot::table::{ENTRY_SIZE, Entry, Presence, check_links};
+use linmot::sdo::{self, Access, Answer};
+use linmot::table::{ENTRY_SIZE, Entry, LISTS, LinkFault, Presence, check_links};
+use motion_io::linmot::curve_file;
 
 use super::Input;
 
@@ -49,67 +50,119 @@ pub fn linmot_pvl(data: &[u8]) {
     }
 }
 
-/// Curve blocks, table entries, links, and the telegrams of all carriers, from any bytes.
-pub fn linmot_parse(data: &[u8]) {
+/// Curve info blocks and setpoints from any bytes.
+pub fn linmot_curve(data: &[u8]) {
     let mut input = Input(data);
-    match input.u8() % 6 {
-        0 => {
-            let mut words = [0; INFO_WORDS];
-            words.iter_mut().for_each(|word| *word = input.i32() as u32);
-            let info = InfoBlock::parse(&words);
-            assert_eq!(InfoBlock::parse(&info.encode()), info);
-            let setpoint = input.u16();
-            assert!(info.x(setpoint) <= info.x_length || setpoint >= info.setpoints || info.setpoints < 2);
-            let (start, end) = (input.i32(), input.i32());
-            let found = sine(start, end, setpoint.min(info.setpoints), info.setpoints);
-            assert!((start.min(end)..=start.max(end)).contains(&found) || setpoint >= info.setpoints.max(2));
-        }
-        1 => {
-            let points: Vec<(f64, f64)> =
-                (0..input.u8() % 8).map(|_| (f64::from(input.i32()), f64::from(input.i32()))).collect();
-            let found = resample(&points, input.u16(), input.u16());
-            assert_eq!(found.is_none(), points.is_empty());
-        }
-        2 => {
-            if let Ok(entry) = Entry::parse(input.bytes(ENTRY_SIZE as u8)) {
-                assert_eq!(Entry::from_words(&entry.words()), Ok(entry));
-                assert!(entry.name().len() <= 16);
-            }
-        }
-        3 => {
-            let mut presence = Presence::default();
-            (0..8).for_each(|list| presence.set_list(list, input.i32() as u32));
-            let links: Vec<u16> = (0..256).map(|_| u16::from(input.u8())).collect();
-            let mut faults = 0;
-            check_links(&presence, |entry| links.get(usize::from(entry)).copied(), |_| faults += 1);
-            assert!(faults <= presence.iter().count());
-        }
-        4 => {
-            let mut telegram = [0; 8];
-            telegram.iter_mut().for_each(|byte| *byte = input.u8());
-            if let Some(access) = Access::parse(telegram) {
-                assert_eq!(Access::parse(access.encode()), Some(access));
-                if let Some(request) = access.request(false) {
-                    // Bytes of a write that mean nothing to its command are not kept.
-                    let again = Access::new(&request).and_then(|access| access.request(false));
-                    assert_eq!(again, Some(request));
-                }
-            }
-            if let Some((index, sub, answer)) = Answer::parse(telegram) {
-                assert_eq!(Answer::parse(answer.encode(index, sub)), Some((index, sub, answer)));
-            }
-            assert_eq!(Output::parse(Output::parse(telegram).encode()), Output::parse(telegram));
-            assert_eq!(
-                ModuleInput::parse(ModuleInput::parse(telegram).encode()),
-                ModuleInput::parse(telegram)
-            );
-        }
-        _ => frames(&mut input),
+    let mut words = [0; INFO_WORDS];
+    words.iter_mut().for_each(|word| *word = input.i32() as u32);
+    let info = InfoBlock::parse(&words);
+    assert_eq!(InfoBlock::parse(&info.encode()), info);
+    let number = input.u16();
+    assert!(info.x(number) <= info.x_length || number >= info.setpoints || info.setpoints < 2);
+    if info.check().is_ok() {
+        assert!(info.data_size() <= u32::from(u16::MAX) && (1..=100).contains(&info.id));
+        assert_eq!((info.x(0), info.x(info.setpoints - 1)), (0, info.x_length));
+    }
+    let (start, end) = (input.i32(), input.i32());
+    for profile in Profile::ALL {
+        let found = profile.setpoint(start, end, number, info.setpoints);
+        assert!((start.min(end)..=start.max(end)).contains(&found));
+    }
+    let points: Vec<(f64, f64)> =
+        (0..input.u8() % 8).map(|_| (f64::from(input.i32()), f64::from(input.i32()))).collect();
+    let found = resample(&points, input.u16(), input.u16());
+    assert_eq!(found.is_none(), points.is_empty());
+    let ascends = points.is_sorted_by(|left, right| left.0 < right.0);
+    if let Some(found) = found.filter(|_| ascends) {
+        let between = |found: f64| {
+            points.iter().any(|point| point.1 <= found) && points.iter().any(|point| point.1 >= found)
+        };
+        assert!(between(f64::from(found)), "{found} in {points:?}");
     }
 }
 
-/// Any bytes in any pieces: every byte ends up in a frame or is counted as discarded.
-fn frames(input: &mut Input<'_>) {
+/// A curve file of any bytes. One that can be read, written again, reads the same.
+pub fn linmot_curve_file(data: &[u8]) {
+    let mut input = Input(data);
+    let id = u16::from(input.u8());
+    let Ok((info, setpoints)) = curve_file::read(&mut &*input.0, id) else { return };
+    assert!(info.check().is_ok() && usize::from(info.setpoints) == setpoints.len() && info.id == id);
+    let mut file = Vec::new();
+    curve_file::write(&mut file, &info, &setpoints).unwrap();
+    assert_eq!(curve_file::read(&mut file.as_slice(), id).unwrap(), (info, setpoints));
+}
+
+/// Command table entries, presence lists and links from any bytes.
+pub fn linmot_table(data: &[u8]) {
+    let mut input = Input(data);
+    let mut presence = Presence::default();
+    (0..LISTS).for_each(|list| presence.set_list(list, input.i32() as u32));
+    assert!(!presence.contains(0) && !presence.contains(256));
+    let mut again = Presence::default();
+    (0..LISTS).for_each(|list| again.set_list(list, presence.list(list)));
+    assert_eq!(again, presence);
+    let exist: Vec<u16> = presence.iter().collect();
+    let links: Vec<u16> = (0..256).map(|_| u16::from(input.u8())).collect();
+    let linked = |entry: u16| links.get(usize::from(entry)).copied();
+    let (mut missing, mut in_loops) = (0, 0);
+    check_links(&presence, linked, |fault| match fault {
+        LinkFault::Missing { entry, linked: to } => {
+            assert!(presence.contains(entry) && !presence.contains(to) && linked(entry) == Some(to));
+            missing += 1;
+        }
+        LinkFault::Loop { entry, length } => {
+            // Following the links as often as the loop is long leads back, and not before.
+            let way: Vec<u16> =
+                core::iter::successors(Some(entry), |at| linked(*at)).take(usize::from(length) + 1).collect();
+            assert_eq!(way.last(), Some(&entry));
+            assert!(way[1..way.len() - 1].iter().all(|at| *at > entry));
+            in_loops += usize::from(length);
+        }
+        other => panic!("{other:?}"),
+    });
+    assert_eq!(missing, exist.iter().filter(|entry| !presence.contains(links[usize::from(**entry)])).count());
+    assert!(missing + in_loops <= exist.len());
+    while !input.is_empty() {
+        if let Ok(entry) = Entry::parse(input.bytes(ENTRY_SIZE as u8)) {
+            assert_eq!(Entry::from_words(&entry.words()), Ok(entry));
+            assert!(entry.name().len() <= 16);
+            let mut other = entry;
+            other.link(entry.linked());
+            assert_eq!(other, entry);
+        }
+    }
+}
+
+/// Telegrams of SDO and of the configuration module from any bytes.
+pub fn linmot_telegrams(data: &[u8]) {
+    let mut input = Input(data);
+    let mut client = sdo::Client::new();
+    while !input.is_empty() {
+        let mut telegram = [0; 8];
+        telegram.iter_mut().for_each(|byte| *byte = input.u8());
+        if let Some(access) = Access::parse(telegram) {
+            assert_eq!(Access::parse(access.encode()), Some(access));
+            if let Some(request) = access.request(false) {
+                // Bytes of a write that mean nothing to its command are not kept.
+                let again = Access::new(&request).and_then(|access| access.request(false));
+                assert_eq!(again, Some(request));
+            }
+        }
+        if let Some((index, sub, answer)) = Answer::parse(telegram) {
+            assert_eq!(Answer::parse(answer.encode(index, sub)), Some((index, sub, answer)));
+            let output = Output::parse(telegram);
+            if let Some(request) = Request::parse(output.command, output.words) {
+                let _ = client.reply(&request, answer);
+            }
+        }
+        assert_eq!(Output::parse(Output::parse(telegram).encode()), Output::parse(telegram));
+        assert_eq!(ModuleInput::parse(ModuleInput::parse(telegram).encode()), ModuleInput::parse(telegram));
+    }
+}
+
+/// LinRS from any bytes in any pieces: every byte ends up in a frame or is counted as discarded.
+pub fn linmot_linrs(data: &[u8]) {
+    let mut input = Input(data);
     let checksum = [Checksum::None, Checksum::Sum, Checksum::Crc][usize::from(input.u8() % 3)];
     let mut decoder = Decoder::new(checksum);
     let (mut given, mut framed) = (0, 0);

@@ -14,7 +14,7 @@ pub use canopen::{od_ops, sdo_client_ops, sdo_server_ops};
 pub use captures::{capture_asc, capture_candump, capture_columns, capture_lb2, capture_pcap, capture_trc};
 pub use device::device_ops;
 pub use frames::{decode, request, response};
-pub use linmot::{linmot_parse, linmot_pvl};
+pub use linmot::{linmot_curve, linmot_curve_file, linmot_linrs, linmot_pvl, linmot_table, linmot_telegrams};
 pub use linmot_ops::{linmot_client_ops, linmot_drive_ops};
 pub use master::master_ops;
 pub use trace::trace;
@@ -23,7 +23,7 @@ pub use trace::trace;
 pub type Target = fn(&[u8]);
 
 /// Every target by its name under `fuzz/fuzz_targets` and `fuzz/corpus`.
-pub const TARGETS: [(&str, Target); 19] = [
+pub const TARGETS: [(&str, Target); 23] = [
     ("lb2_decode", decode),
     ("lb2_request", request),
     ("lb2_response", response),
@@ -40,7 +40,11 @@ pub const TARGETS: [(&str, Target); 19] = [
     ("capture_lb2", capture_lb2),
     ("trace", trace),
     ("linmot_pvl", linmot_pvl),
-    ("linmot_parse", linmot_parse),
+    ("linmot_curve", linmot_curve),
+    ("linmot_curve_file", linmot_curve_file),
+    ("linmot_table", linmot_table),
+    ("linmot_telegrams", linmot_telegrams),
+    ("linmot_linrs", linmot_linrs),
     ("linmot_client_ops", linmot_client_ops),
     ("linmot_drive_ops", linmot_drive_ops),
 ];
