@@ -126,7 +126,12 @@ fn refusals_are_named() {
         linmot.run(&["params", "get", "1111h"]).ends(4).says("UPID error");
         linmot.run(&["params", "set", "2136h", "--rom", "--", "1"]).ends(4).says("address usage error");
         linmot.run(&["params", "set", "119Eh", "--ram", "--", "1"]).ends(4).says("not live");
-        linmot.run(&["params", "set", "119Eh", "--", "32001"]).ends(4).says("range error");
+        linmot
+            .run(&["params", "set", "119Eh", "--", "32001"])
+            .ends(4)
+            .says("range error")
+            .says("0 to 32000 expected");
+        linmot.run(&["params", "set", "3001h", "--", "101"]).ends(4).says("-100 to 100 expected");
         linmot.run(&["params", "set", "119Eh", "--", "x"]).ends(2).says("a number of 32 bits expected");
         linmot.run(&["curve", "get", "5", "-o", "X"]).ends(4).says("no such curve");
         std::fs::write(bench.path("C.csv"), CURVE).unwrap();

@@ -1,5 +1,7 @@
 //! What the reader brings.
 
+use core::fmt;
+
 use crate::curve::{CurveError, InfoBlock};
 use crate::upid::{Layer, TreeIdentity, Upid};
 
@@ -69,22 +71,24 @@ pub enum Problem {
     #[error("a line that belongs to no object")]
     Stray,
     /// An object of an unknown kind, which is passed over.
-    #[error("unknown kind of object, Parameter or Curve expected")]
-    Object,
+    #[error("unknown kind of object {0:?}, Parameter or Curve expected")]
+    Object(Excerpt),
     /// `StartObject` inside an object, or something that ends and had not begun.
-    #[error("begin and end do not match")]
-    Nesting,
+    #[error("begin and end do not match: {0:?} does not belong here")]
+    Nesting(Excerpt),
     /// A number that is none, or too large.
-    #[error("column {column}: a hex number of up to {digits} digits expected")]
+    #[error("column {column}: a hex number of up to {digits} digits expected, {found:?} found")]
     Number {
         /// Counted from 1.
         column: usize,
         /// For its width.
         digits: usize,
+        /// What is there.
+        found: Excerpt,
     },
     /// A header field's number that is none.
-    #[error("a number expected")]
-    Field,
+    #[error("a number expected, {0:?} found")]
+    Field(Excerpt),
     /// `TreeLayer` is missing or not 1…4.
     #[error("TreeLayer 1 to 4 expected before StartData")]
     Layer,
@@ -131,4 +135,58 @@ pub enum Problem {
     /// There is neither a parameter object nor a curve.
     #[error("the file has no parameter object and no curve")]
     Empty,
+}
+
+/// Longest excerpt, in bytes.
+const EXCERPT: usize = 24;
+
+/// The beginning of what stands in a line, to be shown.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub struct Excerpt {
+    bytes: [u8; EXCERPT],
+    len: u8,
+    cut: bool,
+}
+
+impl Excerpt {
+    pub(super) fn of(text: &str) -> Self {
+        let text = text.trim();
+        let len =
+            text.char_indices().map(|(at, c)| at + c.len_utf8()).take_while(|end| *end <= EXCERPT).last();
+        let len = len.unwrap_or(0);
+        let mut bytes = [0; EXCERPT];
+        bytes.iter_mut().zip(text.bytes().take(len)).for_each(|(room, byte)| *room = byte);
+        Self { bytes, len: len as u8, cut: len < text.len() }
+    }
+
+    /// The text, without what was cut off.
+    #[must_use]
+    pub fn as_str(&self) -> &str {
+        // Whole characters were copied.
+        self.bytes
+            .get(..usize::from(self.len))
+            .and_then(|bytes| core::str::from_utf8(bytes).ok())
+            .unwrap_or("")
+    }
+}
+
+/// In quotes, with dots where it was cut off.
+impl fmt::Debug for Excerpt {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:?}{}", self.as_str(), if self.cut { "…" } else { "" })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn excerpts_end_between_characters() {
+        let shown = |text| std::format!("{:?}", Excerpt::of(text));
+        assert_eq!(shown(" a \"b\" "), r#""a \"b\"""#);
+        assert_eq!(shown("123456789012345678901234"), "\"123456789012345678901234\"");
+        assert_eq!(shown("12345678901234567890123€"), "\"12345678901234567890123\"…");
+        assert_eq!(shown(""), "\"\"");
+    }
 }

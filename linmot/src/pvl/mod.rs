@@ -12,7 +12,7 @@ mod row;
 mod text;
 mod write;
 
-pub use event::{Event, Problem, Severity};
+pub use event::{Event, Excerpt, Problem, Severity};
 pub use parse::Parser;
 #[cfg(feature = "alloc")]
 pub use text::{Encoding, LineDecoder};

@@ -1,7 +1,7 @@
 //! The reader, line by line.
 
 use super::row::{column, hex, is_separator, number, values};
-use super::{Event, Problem, Severity};
+use super::{Event, Excerpt, Problem, Severity};
 use crate::curve::{CurveError, INFO_WORDS, InfoBlock};
 use crate::upid::{Layer, TreeIdentity, Upid};
 
@@ -132,13 +132,13 @@ impl Parser {
             }
         } else if is("StartObject") {
             if self.place != Place::Outside {
-                self.problem(sink, wrong, Problem::Nesting);
+                self.problem(sink, wrong, Problem::Nesting(Excerpt::of(bare)));
             }
             self.start_object(value, sink);
         } else if is("EndObject") {
             let inside = matches!(self.place, Place::ParameterRows | Place::CurveInfo | Place::CurveData);
             if inside || self.place == Place::Outside {
-                self.problem(sink, wrong, Problem::Nesting);
+                self.problem(sink, wrong, Problem::Nesting(Excerpt::of(bare)));
             }
             if inside {
                 self.end_block(sink);
@@ -162,23 +162,23 @@ impl Parser {
                         self.problem(sink, wrong, Problem::NoInfo);
                     }
                     if core::mem::replace(&mut self.data_read, true) {
-                        self.problem(sink, wrong, Problem::Nesting);
+                        self.problem(sink, wrong, Problem::Nesting(Excerpt::of(bare)));
                     }
                     (self.place, self.rows, self.columns) = (Place::CurveData, 0, (1, 1));
                 }
                 Place::Unknown => {}
-                _ => self.problem(sink, wrong, Problem::Nesting),
+                _ => self.problem(sink, wrong, Problem::Nesting(Excerpt::of(bare))),
             }
         } else if is("StartInfo") {
             match self.place {
                 Place::Curve => {
                     if self.curve.is_some() {
-                        self.problem(sink, wrong, Problem::Nesting);
+                        self.problem(sink, wrong, Problem::Nesting(Excerpt::of(bare)));
                     }
                     (self.place, self.info_words, self.columns) = (Place::CurveInfo, 0, (1, 1));
                 }
                 Place::Unknown => {}
-                _ => self.problem(sink, wrong, Problem::Nesting),
+                _ => self.problem(sink, wrong, Problem::Nesting(Excerpt::of(bare))),
             }
         } else if is("EndData") || is("EndInfo") {
             let matches = match self.place {
@@ -188,7 +188,7 @@ impl Parser {
                 _ => false,
             };
             if !matches {
-                self.problem(sink, wrong, Problem::Nesting);
+                self.problem(sink, wrong, Problem::Nesting(Excerpt::of(bare)));
             }
             self.end_block(sink);
         } else if word.len() > 3
@@ -208,7 +208,7 @@ impl Parser {
             };
             *field = number(value);
             if field.is_none() {
-                self.problem(sink, wrong, Problem::Field);
+                self.problem(sink, wrong, Problem::Field(Excerpt::of(value)));
             }
         }
         true
@@ -224,7 +224,7 @@ impl Parser {
             self.objects += 1;
         } else {
             self.place = Place::Unknown;
-            self.problem(sink, Severity::Warning, Problem::Object);
+            self.problem(sink, Severity::Warning, Problem::Object(Excerpt::of(kind)));
         }
     }
 
@@ -322,7 +322,8 @@ impl Parser {
                     match hex(word, 8) {
                         Some(value) => self.curve_value(value, sink),
                         None => {
-                            self.problem(sink, Severity::Error, Problem::Number { column, digits: 8 });
+                            let found = Excerpt::of(word);
+                            self.problem(sink, Severity::Error, Problem::Number { column, digits: 8, found });
                         }
                     }
                 }
@@ -350,12 +351,15 @@ impl Parser {
 
     fn parameter(&mut self, text: &str, sink: &mut impl FnMut(Event)) {
         let (upid_column, value_column) = self.columns;
-        let upid = column(text, upid_column).and_then(|text| hex(text, 4));
-        let value = column(text, value_column).and_then(|text| hex(text, 8));
-        let upid = upid.and_then(|upid| u16::try_from(upid).ok()).map(Upid);
+        let (upid_text, value_text) = (column(text, upid_column), column(text, value_column));
+        let upid =
+            upid_text.and_then(|text| hex(text, 4)).and_then(|upid| u16::try_from(upid).ok()).map(Upid);
+        let value = value_text.and_then(|text| hex(text, 8));
         let (Some(upid), Some(value)) = (upid, value) else {
-            let (column, digits) = if upid.is_none() { (upid_column, 4) } else { (value_column, 8) };
-            return self.problem(sink, Severity::Error, Problem::Number { column, digits });
+            let (column, digits, text) =
+                if upid.is_none() { (upid_column, 4, upid_text) } else { (value_column, 8, value_text) };
+            let found = Excerpt::of(text.unwrap_or_default());
+            return self.problem(sink, Severity::Error, Problem::Number { column, digits, found });
         };
         let layer = self.layer.and_then(Layer::from_number);
         if layer.is_some() && upid.layer() != layer {
@@ -479,9 +483,11 @@ mod tests {
             problems(&FILE.replacen(from, to, 1))
         };
         assert_eq!(problems(FILE), []);
-        let column = |n, digits| std::format!("column {n}: a hex number of up to {digits} digits expected");
-        assert_eq!(with("03E9h", "103E9h"), [(12, wrong, column(1, 4))]);
-        assert_eq!(with("6F43794D", "XF43794D"), [(12, wrong, column(2, 8))]);
+        let column = |n, digits, found| {
+            std::format!("column {n}: a hex number of up to {digits} digits expected, {found:?} found")
+        };
+        assert_eq!(with("03E9h", "103E9h"), [(12, wrong, column(1, 4, "103E9h"))]);
+        assert_eq!(with("6F43794D", "XF43794D"), [(12, wrong, column(2, 8, "XF43794Dh"))]);
         assert_eq!(with("03EAh", "03E9h"), [(13, wrong, "UPID 03E9h occurs twice".into())]);
         assert_eq!(
             with("03EAh", "13EAh"),
@@ -489,7 +495,10 @@ mod tests {
         );
         assert_eq!(with("@TreeID 1\n", "\n"), [(10, wrong, "TreeID is missing before StartData".into())]);
         assert_eq!(with("@TreeLayer 1", "@TreeLayer 5")[0].2, "TreeLayer 1 to 4 expected before StartData");
-        assert_eq!(with("@MainVersion 3", "@MainVersion x")[0], (7, wrong, "a number expected".into()));
+        assert_eq!(
+            with("@MainVersion 3", "@MainVersion x")[0],
+            (7, wrong, "a number expected, \"x\" found".into())
+        );
         let count = "curve: the info block says 10 setpoints, 9 are there";
         assert_eq!(with("000075CAh\n", "\n"), [(35, wrong, count.into())]);
         assert_eq!(with("0004000Ah", "")[0].2, "info block of 17 words, 18 expected");
@@ -502,7 +511,11 @@ mod tests {
         assert_eq!(with("@EndData", "").len(), 1);
         assert_eq!(
             with("Parameter", "Oscilloscope"),
-            [(3, Severity::Warning, "unknown kind of object, Parameter or Curve expected".into())]
+            [(
+                3,
+                Severity::Warning,
+                "unknown kind of object \"Oscilloscope\", Parameter or Curve expected".into()
+            )]
         );
         let bare = "FileType PVL\nStartObject Curve\nEndObject";
         assert_eq!(problems(bare), [(3, wrong, "info block of 0 words, 18 expected".into())]);

@@ -1,7 +1,8 @@
 //! Curves as CSV: a head line of attributes, then one setpoint a line (project-defined).
 //!
 //! `# name=… length_ms=… unit=0.1um` is all that a file made by hand needs; a cam has `length=…` in
-//! encoder increments in place of `length_ms`. What [`write`] writes has all that the info block has.
+//! encoder increments in place of `length_ms`. What [`write`] writes has all that the info block has, and
+//! `setpoints=…`, by which a file that was cut off is known.
 //! A value lies between quotes where it would be taken for something else.
 
 use std::io::{self, BufRead, Write};
@@ -12,7 +13,8 @@ use linmot::pvl::{Encoding, LineDecoder};
 use super::lines::Lines;
 
 /// Attributes of the head line.
-const KEYS: [&str; 8] = ["name", "length_ms", "length", "unit", "type", "x_unit", "y_unit", "wizard"];
+const KEYS: [&str; 9] =
+    ["name", "length_ms", "length", "unit", "type", "x_unit", "y_unit", "wizard", "setpoints"];
 /// What a head line looks like.
 const HEAD: &str = "# name=… length_ms=… unit=0.1um";
 /// Characters of a faulty line that an error shows.
@@ -41,6 +43,17 @@ pub enum CurveFileError {
         /// That of the first setpoint too many.
         line: usize,
     },
+    /// The head line says another number of setpoints than there are.
+    #[error("line 1 says setpoints={said}, {found} are there: the file was cut off or changed")]
+    Count {
+        /// In the head line.
+        said: usize,
+        /// In the file.
+        found: usize,
+    },
+    /// The head line says the number of setpoints, and the last line may not be whole.
+    #[error("the last line has no end: the file may be cut off")]
+    CutOff,
     /// A drive would not take it.
     #[error(transparent)]
     Curve(#[from] CurveError),
@@ -77,7 +90,7 @@ pub fn write(out: &mut impl Write, info: &InfoBlock, setpoints: &[i32]) -> io::R
     for parameter in info.wizard {
         write!(out, ":{parameter}")?;
     }
-    writeln!(out)?;
+    writeln!(out, " setpoints={}", setpoints.len())?;
     setpoints.iter().try_for_each(|setpoint| writeln!(out, "{setpoint}"))
 }
 
@@ -104,6 +117,13 @@ pub fn read(file: &mut impl BufRead, id: u16) -> Result<(InfoBlock, Vec<i32>), C
             return Err(CurveFileError::TooMany { line: number });
         }
         setpoints.push(setpoint);
+    }
+    match head.parsed("setpoints", "setpoints=NUMBER", |value| value.parse().ok())? {
+        Some(said) if said != setpoints.len() => {
+            return Err(CurveFileError::Count { said, found: setpoints.len() });
+        }
+        Some(_) if !lines.ended() => return Err(CurveFileError::CutOff),
+        _ => {}
     }
     let info = head.info(id, setpoints.len() as u16)?;
     info.check()?;
@@ -260,6 +280,20 @@ mod tests {
     }
 
     #[test]
+    fn a_file_that_was_cut_off_is_no_shorter_curve() {
+        let info = InfoBlock::position_over_time(7, "seven", 20_000, 3).unwrap();
+        let mut file = Vec::new();
+        write(&mut file, &info, &[0, -5, 1_000_000]).unwrap();
+        let head = file.iter().position(|byte| *byte == b'\n').unwrap();
+        for len in head..file.len() {
+            let error = read(&mut &file[..len], 7).unwrap_err().to_string();
+            let half_a_number = error.contains("line 3: a setpoint");
+            assert!(error.contains("cut off") || half_a_number, "{len} of {} bytes: {error}", file.len());
+        }
+        assert!(read(&mut file.as_slice(), 7).is_ok());
+    }
+
+    #[test]
     fn what_is_wrong_is_said_with_its_line() {
         let many = format!("# length_ms=1\n{}", "7\n".repeat(20_000));
         let long = format!("# length_ms=1\n{}", "7".repeat(5000));
@@ -278,6 +312,7 @@ mod tests {
             ("# length_ms=1 type=0x1003\n0\n1\n", "object type 1003h"),
             ("# length_ms=1 x_unit=0x10000\n0\n1\n", "x_unit=0x001A expected"),
             ("# length_ms=1 wizard=0:1\n0\n1\n", "wizard=TYPE:PAR1:…:PAR7 expected"),
+            ("# length_ms=1 setpoints=x\n0\n1\n", "setpoints=NUMBER expected, \"setpoints=x\" found"),
             ("# length_ms=1 name=1234567890123456789012\n0\n1\n", "a name of up to 21 characters"),
             (&many, "line 16385: 2 to 16383 setpoints expected, here is one more"),
             (&long, "line 2 is longer than 4096 bytes"),

@@ -11,11 +11,12 @@ pub(super) struct Lines<'a, F> {
     file: &'a mut F,
     line: Vec<u8>,
     number: usize,
+    ended: bool,
 }
 
 impl<'a, F: BufRead> Lines<'a, F> {
     pub(super) const fn new(file: &'a mut F) -> Self {
-        Self { file, line: Vec::new(), number: 0 }
+        Self { file, line: Vec::new(), number: 0, ended: true }
     }
 
     /// The next line and its number, counted from 1; `None` at the end.
@@ -29,6 +30,7 @@ impl<'a, F: BufRead> Lines<'a, F> {
             return Ok(None);
         }
         self.number += 1;
+        self.ended = self.line.ends_with(b"\n");
         match self.line.strip_suffix(b"\n") {
             Some(line) => Ok(Some((self.number, line))),
             None if len <= LONGEST => Ok(Some((self.number, &self.line))),
@@ -37,5 +39,10 @@ impl<'a, F: BufRead> Lines<'a, F> {
                 Err(io::Error::new(io::ErrorKind::InvalidData, text))
             }
         }
+    }
+
+    /// Whether the last line that was read has its end.
+    pub(super) const fn ended(&self) -> bool {
+        self.ended
     }
 }

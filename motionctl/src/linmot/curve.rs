@@ -171,12 +171,14 @@ fn svg(info: &InfoBlock, setpoints: &[i32]) -> String {
     const WIDTH: f64 = 800.0;
     const HEIGHT: f64 = 400.0;
     const MARGIN: f64 = 60.0;
+    /// Left of the frame, for positions.
+    const LEFT: f64 = 120.0;
     let (low, high) =
         setpoints.iter().fold((i32::MAX, i32::MIN), |(low, high), y| (low.min(*y), high.max(*y)));
     let span = (f64::from(high) - f64::from(low)).max(1.0);
     let last = (setpoints.len().max(2) - 1) as f64;
     let points = setpoints.iter().enumerate().fold(String::new(), |mut points, (n, y)| {
-        let x = MARGIN + WIDTH * n as f64 / last;
+        let x = LEFT + WIDTH * n as f64 / last;
         let y = MARGIN + HEIGHT * (f64::from(high) - f64::from(*y)) / span;
         let _ = write!(points, "{x:.2},{y:.2} ");
         points
@@ -190,21 +192,25 @@ fn svg(info: &InfoBlock, setpoints: &[i32]) -> String {
     let mm = |value: i32| f64::from(value) / 10_000.0;
     format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {} {}\" font-family=\"sans-serif\" font-size=\"14\">\n\
-         <rect x=\"{MARGIN}\" y=\"{MARGIN}\" width=\"{WIDTH}\" height=\"{HEIGHT}\" fill=\"none\" stroke=\"#999\"/>\n\
-         <text x=\"{MARGIN}\" y=\"30\">curve {} {escaped}</text>\n\
-         <text x=\"{MARGIN}\" y=\"{}\">0</text>\n\
+         <rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n\
+         <rect x=\"{LEFT}\" y=\"{MARGIN}\" width=\"{WIDTH}\" height=\"{HEIGHT}\" fill=\"none\" stroke=\"#999\"/>\n\
+         <text x=\"{LEFT}\" y=\"30\">curve {} {escaped}</text>\n\
+         <text x=\"{LEFT}\" y=\"{}\">0</text>\n\
          <text x=\"{}\" y=\"{}\" text-anchor=\"end\">{length}</text>\n\
-         <text x=\"5\" y=\"{}\">{} mm</text>\n<text x=\"5\" y=\"{}\">{} mm</text>\n\
+         <text x=\"{}\" y=\"{}\" text-anchor=\"end\">{} mm</text>\n\
+         <text x=\"{}\" y=\"{}\" text-anchor=\"end\">{} mm</text>\n\
          <polyline points=\"{}\" fill=\"none\" stroke=\"#06c\" stroke-width=\"2\"/>\n</svg>\n",
-        WIDTH + 2.0 * MARGIN,
+        LEFT + WIDTH + MARGIN,
         HEIGHT + 2.0 * MARGIN,
         info.id,
         HEIGHT + MARGIN + 20.0,
-        WIDTH + MARGIN,
+        LEFT + WIDTH,
         HEIGHT + MARGIN + 20.0,
-        MARGIN - 5.0,
+        LEFT - 8.0,
+        MARGIN + 10.0,
         mm(high),
-        HEIGHT + MARGIN - 5.0,
+        LEFT - 8.0,
+        HEIGHT + MARGIN,
         mm(low),
         points.trim_end(),
     )

@@ -191,7 +191,17 @@ fn set(
         })?;
         if !global.dry_run {
             out.confirm_on_terminal(global.yes, &format!("Write {upid} in {name}?"))?;
-            link.write(upid, memory, raw)?;
+            if let Err(fault) = link.write(upid, memory, raw) {
+                let range = match &fault {
+                    Fault::Refused { reply, .. } if reply.status == Status::RANGE => range(&mut link, upid),
+                    _ => None,
+                };
+                let exit = Exit::from(fault);
+                return Err(match range {
+                    Some(range) => Exit { message: format!("{}; {range} expected", exit.message), ..exit },
+                    None => exit,
+                });
+            }
         }
     }
     if global.dry_run {
@@ -201,6 +211,20 @@ fn set(
     let shown = read(&mut link, upid, usage, BOTH)?;
     out.document(json!({ "parameters": [to_json(&shown, None)] }), || print(&shown));
     Ok(())
+}
+
+/// Minimum and maximum, as far as the drive tells. Of a signed type the minimum is the greater of the raw
+/// values, as wide as its type.
+fn range(link: &mut AnyLink, upid: Upid) -> Option<String> {
+    let minimum = link.read(upid, Value::Minimum).ok()?;
+    let maximum = link.read(upid, Value::Maximum).ok()?;
+    let signed = match minimum {
+        _ if minimum <= maximum => i64::from(minimum),
+        0..=0xFF => i64::from(minimum as u8 as i8),
+        0x100..=0xFFFF => i64::from(minimum as u16 as i16),
+        _ => i64::from(minimum as i32),
+    };
+    Some(format!("{signed} to {maximum}"))
 }
 
 fn defaults(out: &Output, global: &Global, drive: &Drive, layers: &[LayerName]) -> Result<(), Exit> {

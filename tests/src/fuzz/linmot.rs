@@ -174,9 +174,11 @@ pub fn linmot_linrs(data: &[u8]) {
             let mut out = [0; MAX_FRAME];
             framed += message.encode(checksum, &mut out) as u64;
             if let Some(request) = linrs::request(&message) {
-                let again = linrs::request(&linrs::telegram(message.id, &request));
-                let text = matches!(request, Request::ErrorText { .. });
-                assert!(again == Some(request) || text);
+                // Words of a tunnelled command that mean nothing to it are not kept.
+                let again = linrs::request(&linrs::telegram(message.id, &request)).expect("a command");
+                assert_eq!(again.command(), request.command());
+                let third = linrs::request(&linrs::telegram(message.id, &again));
+                assert_eq!(third, Some(again));
             }
         }
     };
