@@ -189,6 +189,7 @@ impl<'d> Process<'d> {
         }
     }
 
+    #[inline(never)]
     fn reset(&mut self, now: Duration) -> Action<'d> {
         self.step = Step::BootUp;
         self.deadline = Some(after(now, self.config.boot_up));
@@ -265,6 +266,7 @@ impl<'d> Process<'d> {
         }
     }
 
+    #[inline(never)]
     fn start(&mut self) -> Action<'d> {
         self.deadline = None;
         self.step = Step::Start;

@@ -124,7 +124,7 @@ impl<'d, B: Buffer, const N: usize> Master<'d, B, N> {
         buffer: B,
         options: &sdo::Options,
     ) -> Result<sdo::Ticket, Refused<B>> {
-        self.transfer(node, buffer, |client, buffer| client.upload_as(at, buffer, options, Data::User))
+        self.transfer(node, at, buffer, options, false)
     }
 
     /// Writes what `buffer` holds to an object of a node.
@@ -138,27 +138,30 @@ impl<'d, B: Buffer, const N: usize> Master<'d, B, N> {
         buffer: B,
         options: &sdo::Options,
     ) -> Result<sdo::Ticket, Refused<B>> {
-        self.transfer(node, buffer, |client, buffer| client.download_as(at, buffer, options, Data::User))
+        self.transfer(node, at, buffer, options, true)
     }
 
     fn transfer(
         &mut self,
         id: NodeId,
+        at: Address,
         buffer: B,
-        begin: impl FnOnce(&mut sdo::Client<Data<'d, B>>, B) -> Result<sdo::Ticket, sdo::Refused<B>>,
+        options: &sdo::Options,
+        write: bool,
     ) -> Result<sdo::Ticket, Refused<B>> {
         if let Err(error) = self.check(id).and_then(|()| self.check_bus()) {
             return Err(Refused { error, buffer });
         }
-        let last = Self::LAST.raw();
-        let Some(node) = self.node_mut(id) else {
-            return Err(Refused { error: SubmitError::Node { node: id, last }, buffer });
-        };
-        if !matches!(node.job, Job::None) || !node.sdo.is_idle() {
+        let Some(node) = self.node_mut(id).filter(|node| node.is_free()) else {
             return Err(Refused { error: SubmitError::Busy(id), buffer });
-        }
-        let ticket = begin(&mut node.sdo, buffer)
-            .map_err(|sdo::Refused { error, buffer }| Refused { error: error.into(), buffer })?;
+        };
+        let begun = if write {
+            node.sdo.download_as(at, buffer, options, Data::User)
+        } else {
+            node.sdo.upload_as(at, buffer, options, Data::User)
+        };
+        let ticket =
+            begun.map_err(|sdo::Refused { error, buffer }| Refused { error: error.into(), buffer })?;
         self.sdo_busy.insert(id);
         self.sdo_ready.insert(id);
         Ok(ticket)
@@ -240,10 +243,9 @@ impl<'d, B: Buffer, const N: usize> Master<'d, B, N> {
         self.check_bus()?;
         let mut process = Process::new(config);
         let action = process.begin(now);
-        let Some(node) = self.node_mut(id) else { return Ok(()) };
-        if !matches!(node.job, Job::None) || !node.sdo.is_idle() {
+        let Some(node) = self.node_mut(id).filter(|node| node.is_free()) else {
             return Err(SubmitError::Busy(id));
-        }
+        };
         node.guard = None;
         node.heartbeat = None;
         node.job = Job::Boot(process);

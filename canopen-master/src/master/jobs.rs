@@ -5,7 +5,7 @@ use core::time::Duration;
 use pdo::{Address, NodeId};
 
 use super::Master;
-use super::node::{Data, Job, ScanStep};
+use super::node::{Data, Job, Node, ScanStep};
 use crate::boot::Action;
 use crate::guarding::Guard;
 use crate::heartbeat::Consumer;
@@ -135,9 +135,7 @@ impl<'d, B: Buffer, const N: usize> Master<'d, B, N> {
 
     fn scan_candidate(&self) -> Option<NodeId> {
         let scan = self.scan.as_ref()?;
-        let free = |id: &NodeId| {
-            self.node(*id).is_some_and(|node| matches!(node.job, Job::None) && node.sdo.is_idle())
-        };
+        let free = |id: &NodeId| self.node(*id).is_some_and(Node::is_free);
         scan.todo.iter().find(free)
     }
 

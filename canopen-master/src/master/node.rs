@@ -155,6 +155,11 @@ impl<B: Buffer> Node<'_, B> {
         }
     }
 
+    /// Whether a transfer, a boot or a scan can begin.
+    pub(super) const fn is_free(&self) -> bool {
+        matches!(self.job, Job::None) && self.sdo.is_idle()
+    }
+
     /// The earliest of its deadlines, those of error control only while the bus is there.
     pub(super) fn poll_timeout(&self, bus: bool) -> Option<Duration> {
         let guard = self.guard.as_ref().filter(|_| bus).and_then(Guard::poll_timeout);

@@ -196,7 +196,8 @@ impl<B: Buffer> Client<B> {
     ///
     /// # Errors
     /// [`SubmitError::Busy`] until the last outcome has been polled.
-    #[inline]
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    #[cfg_attr(not(target_pointer_width = "32"), inline)]
     pub fn upload(&mut self, at: Address, buffer: B, options: &Options) -> Result<Ticket, Refused<B>> {
         self.upload_as(at, buffer, options, |buffer| buffer)
     }
@@ -344,7 +345,8 @@ impl<B: Buffer> Client<B> {
     }
 
     /// The outcome of the transfer and its buffer, once.
-    #[inline]
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    #[cfg_attr(not(target_pointer_width = "32"), inline)]
     pub fn poll_event(&mut self) -> Option<Finished<B>> {
         let outcome = match self.state {
             State::Done => Outcome::Done(self.offset),
@@ -437,7 +439,8 @@ impl<B: Buffer> Client<B> {
     }
 
     /// Whether the request that is ready to go waits for an old answer.
-    #[inline]
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    #[cfg_attr(not(target_pointer_width = "32"), inline)]
     fn held_back_until(&self) -> Option<Duration> {
         let outstanding = self.outstanding?;
         let upload = match self.state {
@@ -481,7 +484,8 @@ impl<B: Buffer> Client<B> {
         self.deadline = None;
     }
 
-    #[inline]
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    #[cfg_attr(not(target_pointer_width = "32"), inline)]
     fn done(&mut self) {
         self.tx = None;
         self.deadline = None;
