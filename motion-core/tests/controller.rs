@@ -86,6 +86,7 @@ fn refused_values_leave_the_old_one() {
     assert_eq!((controller.read_parameter(50), controller.read_parameter(65535)), (0, 0));
     let unused = controller.describe_parameter(50);
     assert!(unused.name.is_empty() && unused.group.is_empty() && unused.variant.is_empty());
+    assert_eq!(controller.write_parameter(300, 1).code, LoaderCode(0x01), "slave: switch on again");
     assert_eq!(controller.write_parameter(302, 1).code, LoaderCode(0x01), "CAN Link: switch on again");
     assert_eq!(controller.write_parameter(302, 1).code, LoaderCode::OK, "unchanged");
 }

@@ -139,6 +139,12 @@ impl CanBus {
         self.role
     }
 
+    /// The objects in use.
+    #[must_use]
+    pub const fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
     /// Takes over the objects. Master or slave, and CAN Link, are effective after switching on (6.5.1);
     /// new objects take part after a scan (4.3.4.4).
     pub fn configure(&mut self, values: &Values) {
@@ -163,8 +169,11 @@ impl CanBus {
     }
 
     /// Nodes that the scan expects: addresses 1…16 with an object that is not inactive and not Other.
+    /// Bypassed addresses have neither scan nor guarding (6.5.1.1).
     fn expected(&self) -> NodeSet {
-        let scanned = |object: &Object| object.kind != Kind::Other && usize::from(object.node.raw()) <= NODES;
+        let scanned = |object: &Object| {
+            !object.bypass && object.kind != Kind::Other && usize::from(object.node.raw()) <= NODES
+        };
         self.settings.iter().filter(scanned).map(|object| object.node).collect()
     }
 
@@ -202,26 +211,27 @@ impl CanBus {
         self.ready
     }
 
-    /// Scans the bus and boots what is found; done by itself after switching on.
+    /// Scans the bus and boots what is found; done by itself after switching on. A master whose objects
+    /// are all inactive has nothing to do with the bus: it is silent, without SYNC (project-defined).
     pub fn scan(&mut self) {
         let expected = self.expected();
+        let used = self.settings.iter().next().is_some();
         let Engine::Master(master) = &mut self.engine else { return };
+        // A period of 10 ms without a counter is always taken.
+        let sync = sync::Producer::new(sync::PERIOD, 0, Duration::ZERO, self.now).ok();
+        master.set_sync(sync.filter(|_| used));
         // Refused while one is under way, or without a bus: what is expected stays silent then.
         self.scanning = !expected.is_empty() && master.scan(expected, scan::Options::default()).is_ok();
         self.ready = NodeSet::EMPTY;
         self.to_boot = NodeSet::EMPTY;
+        if used && expected.is_empty() {
+            self.start_others();
+        }
     }
 
     fn start(&mut self, now: Duration) {
-        match &mut self.engine {
-            Engine::Master(master) => {
-                // A period of 10 ms without a counter is always taken.
-                master.set_sync(sync::Producer::new(sync::PERIOD, 0, Duration::ZERO, now).ok());
-            }
-            Engine::Slave(slave) => {
-                slave.boot(now);
-            }
-            Engine::Link(_) => {}
+        if let Engine::Slave(slave) = &mut self.engine {
+            slave.boot(now);
         }
         self.scan();
     }

@@ -135,6 +135,10 @@ impl<S: Storage, R: AsRef<[u8]> + AsMut<[u8]>> Device for Controller<S, R> {
 
     fn write_parameter(&mut self, index: u16, value: i32) -> LoaderAnswer<'_> {
         let (code, text) = match self.edited.set(index, value) {
+            Ok(_) if loader::is_no_address(index, value) => {
+                loader::correct(&mut self.edited);
+                loader::NO_ADDRESS
+            }
             Ok(old) => loader::remark(index, old != value),
             Err(error) => loader::refusal(&error),
         };

@@ -253,6 +253,13 @@ impl<S: Storage, R: AsRef<[u8]> + AsMut<[u8]>> Controller<S, R> {
         outputs.terminals
     }
 
+    /// Begins anew on both CAN buses, as after switching on: the roles of `[300]`…`[303]` that are effective
+    /// only then (6.5.1) are so now.
+    pub fn restart_buses(&mut self) {
+        self.buses = [0, 1].map(|at| CanBus::new(self.model.number(), &self.working, at));
+        self.manual_scan = false;
+    }
+
     /// CAN 1 (0) or CAN 2 (1): frames and time go in, frames come out.
     pub fn bus(&mut self, at: usize) -> Option<&mut CanBus> {
         self.buses.get_mut(at)

@@ -99,6 +99,16 @@ impl fmt::Display for Expected {
 }
 
 impl Entry {
+    /// A choice by its text, as of a parameter whose display has no point.
+    pub(super) const fn chosen(&self, value: i32) -> Formatted {
+        Formatted { entry: *self, value, decimals: 0 }
+    }
+
+    /// What a characteristic takes.
+    pub(super) const fn takes(&self) -> impl fmt::Display {
+        Expected { entry: *self, decimals: 0 }
+    }
+
     /// The value as people read it; `values` hold the display's decimal point.
     #[must_use]
     pub fn format(&self, value: i32, values: &Values) -> Formatted {
@@ -225,7 +235,8 @@ mod tests {
         assert_eq!(say(642, "5-3"), "[642] V max., Axis 1: 0 to 3276800 expected");
         assert_eq!(
             say(103, "incremental"),
-            "[103] Type, Actual value input 4: choice 0 cannot be selected here"
+            "[103] Type, Actual value input 4: Incremental cannot be selected here, \
+             \"CAN bus\", \"Virtual1\", \"Virtual2\", \"Analog\" expected"
         );
     }
 

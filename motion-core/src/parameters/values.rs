@@ -25,7 +25,7 @@ pub enum RangeError {
         value: i32,
     },
     /// A choice that this instance does not have.
-    #[error("{entry}: choice {value} cannot be selected here")]
+    #[error("{entry}: {} cannot be selected here, {} expected", .entry.chosen(*.value), .entry.takes())]
     Choice {
         /// The parameter.
         entry: Entry,
