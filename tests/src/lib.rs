@@ -2,6 +2,7 @@
 //! traffic replayed through our engines ([`replay`]), and the report of both ([`report`]). What the
 //! whole-family tests and the fuzz targets share is here, too.
 
+pub mod controllers;
 pub mod fuzz;
 pub mod node;
 pub mod replay;
