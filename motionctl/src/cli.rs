@@ -104,14 +104,24 @@ pub(crate) enum Command {
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Sim {
-    /// A virtual GEL 823x that answers LB2
+    /// A virtual GEL 823x that answers LB2; with CAN buses, all of a controller, whose parameters say
+    /// whether it is CANopen master, CANopen slave or on CAN Link
     Controller {
         /// 8230, 8231, 8235 or 8236
         #[arg(long, default_value_t = 8230)]
         model: u16,
         /// Endpoint to answer on: pty:LINK, tcp:HOST:PORT, a serial port, or for LB2 over CAN a CAN endpoint
+        #[arg(long, value_name = "EP", required_unless_present_any = ["can1", "can2"])]
+        serial: Option<String>,
+        /// CAN endpoint that is its CAN 1
         #[arg(long, value_name = "EP")]
-        serial: String,
+        can1: Option<String>,
+        /// CAN endpoint that is its CAN 2
+        #[arg(long, value_name = "EP")]
+        can2: Option<String>,
+        /// Parameter by number or name, set before the start; may be given several times
+        #[arg(long, value_name = "KEY=VALUE")]
+        set: Vec<String>,
         /// File for flash and retained values; absent: in memory
         #[arg(long, value_name = "FILE")]
         state: Option<PathBuf>,

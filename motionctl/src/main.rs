@@ -6,6 +6,16 @@
 // The program, with motion-io, is what reads the machine's clock.
 #![allow(clippy::disallowed_methods)]
 
+/// As std's, but that nobody reads to the end, as with `| head`, is no trouble.
+macro_rules! println {
+    ($($words:tt)*) => { $crate::output::put(&format!("{}\n", format_args!($($words)*))) };
+}
+
+/// As std's, but that nobody listens is no trouble.
+macro_rules! eprintln {
+    ($($words:tt)*) => { $crate::output::complain(format_args!("{}\n", format_args!($($words)*))) };
+}
+
 mod can;
 mod cli;
 mod conform;
@@ -36,7 +46,7 @@ fn main() -> ExitCode {
         Command::Demo(arguments) => demo::run(&out, &arguments),
         Command::Plot(arguments) => plot::run(&out, &arguments),
         Command::Run(arguments) => run::run(&out, &arguments),
-        Command::Sim { command } => sim::run(&out, &cli.global, &command),
+        Command::Sim { command } => sim::start(&out, &cli.global, &command),
         Command::Can { command } => can::run(&out, &cli.global, &command),
         Command::Conform(arguments) => conform::run(&out, &cli.global, &arguments),
         Command::Bus(arguments) => can::bus::run(&out, &arguments),
@@ -47,14 +57,19 @@ fn main() -> ExitCode {
         Command::Decode(args) => decode::run(&out, &args),
         Command::Eds { command } => eds::run(&out, cli.global.dry_run, &command),
         Command::Completions { shell } => {
-            clap_complete::generate(shell, &mut Cli::command(), "motionctl", &mut std::io::stdout());
+            let mut script = Vec::new();
+            clap_complete::generate(shell, &mut Cli::command(), "motionctl", &mut script);
+            output::put(script);
             Ok(())
         }
-        Command::Man => clap_mangen::Man::new(Cli::command())
-            .render(&mut std::io::stdout())
-            .map_err(|error| exit::Exit::file("standard output", &error)),
+        Command::Man => {
+            let mut page = Vec::new();
+            let rendered = clap_mangen::Man::new(Cli::command()).render(&mut page);
+            output::put(page);
+            rendered.map_err(|error| exit::Exit::file("the manual page", &error))
+        }
     };
-    match done {
+    match done.and_then(|()| output::lost()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(exit) => {
             out.failed(&exit);

@@ -1,8 +1,9 @@
 //! What goes to standard output and standard error.
 
 use core::cell::RefCell;
-use std::io::{IsTerminal, Write};
+use std::io::{ErrorKind, IsTerminal, Write};
 use std::path::Path;
+use std::sync::OnceLock;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
@@ -46,20 +47,17 @@ impl Output {
             }
         }
         println!("{whole}");
-        let _ = std::io::stdout().flush();
     }
 
     /// A line of a stream: one JSON object, or what `text` says.
     pub(crate) fn line(&self, document: Value, text: impl FnOnce() -> String) {
         self.document(document, || println!("{}", text()));
-        let _ = std::io::stdout().flush();
     }
 
     /// A line about what happens, for people.
     pub(crate) fn say(&self, text: &str) {
         if !self.json && !self.quiet {
             println!("{text}");
-            let _ = std::io::stdout().flush();
         }
     }
 
@@ -103,7 +101,7 @@ impl Output {
         if !std::io::stdin().is_terminal() {
             return Err(Exit::usage(format!("{question} Without a terminal to ask on, --yes must say so")));
         }
-        eprint!("{question} [y/N] ");
+        complain(format_args!("{question} [y/N] "));
         let mut answer = String::new();
         std::io::stdin().read_line(&mut answer).map_err(|error| Exit::file("standard input", &error))?;
         match answer.trim() {
@@ -113,10 +111,30 @@ impl Output {
     }
 }
 
-/// Writes to standard output. That nobody reads to the end, as with `| head`, is no trouble.
-pub(crate) fn put(text: &str) {
+/// Why standard output took no more, other than that nobody reads it.
+static LOST: OnceLock<String> = OnceLock::new();
+
+/// Writes to standard output. That nobody reads to the end, as with `| head`, is no trouble: a command that
+/// runs until it is stopped stops as if told to, any other one goes on to its end, so that nothing is left
+/// half done.
+pub(crate) fn put(bytes: impl AsRef<[u8]>) {
     let mut stdout = std::io::stdout().lock();
-    let _ = stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush());
+    if let Err(error) = stdout.write_all(bytes.as_ref()).and_then(|()| stdout.flush()) {
+        if error.kind() != ErrorKind::BrokenPipe {
+            LOST.get_or_init(|| error.to_string());
+        }
+        crate::can::stop();
+    }
+}
+
+/// Trouble with standard output that [`put`] has met.
+pub(crate) fn lost() -> Result<(), Exit> {
+    LOST.get().map_or(Ok(()), |error| Err(Exit::file("standard output", error)))
+}
+
+/// Writes to standard error, if anybody listens.
+pub(crate) fn complain(text: core::fmt::Arguments<'_>) {
+    let _ = std::io::stderr().write_fmt(text);
 }
 
 /// Writes a file beside its place and moves it there, so that an older one is never half overwritten.

@@ -16,28 +16,35 @@ use crate::can::{self, stop_flag};
 use crate::cli::{Global, Sim};
 use crate::exit::Exit;
 use crate::output::Output;
+use crate::run;
 use crate::storage::FileStorage;
 
-pub(crate) fn run(out: &Output, global: &Global, command: &Sim) -> Result<(), Exit> {
-    let (model, serial, state, device) = match command {
-        Sim::Controller { model, serial, state, device } => (model, serial, state, device),
+pub(crate) fn start(out: &Output, global: &Global, command: &Sim) -> Result<(), Exit> {
+    let (model, serial, can, set, state, device) = match command {
+        Sim::Controller { model, serial, can1, can2, set, state, device } => {
+            (*model, serial.as_deref(), [can1.as_deref(), can2.as_deref()], set, state.as_deref(), *device)
+        }
         Sim::Drive(arguments) => return can::sim::drive(out, global, arguments),
         Sim::Io(arguments) => return can::sim::io(out, global, arguments),
         Sim::Node(arguments) => return can::sim::file(out, global, arguments),
         Sim::Linmot(arguments) => return crate::linmot::sim::run(out, arguments),
     };
-    let model = Model::from_number(*model)
+    let Some(line) = serial.filter(|_| can == [None; 2] && set.is_empty()) else {
+        let whole = run::Device { model, number: device, serial, can, parameters: set, state };
+        return run::device(out, &whole);
+    };
+    let model = Model::from_number(model)
         .ok_or_else(|| Exit::usage(format!("--model {model}: 8230, 8231, 8235 or 8236 expected")))?;
     let endpoint: Endpoint =
-        serial.parse().map_err(|error: motion_io::endpoint::EndpointError| Exit::usage(error.to_string()))?;
+        line.parse().map_err(|error: motion_io::endpoint::EndpointError| Exit::usage(error.to_string()))?;
     let stop = stop_flag()?;
     match state {
         Some(path) => {
             let storage =
                 FileStorage::open(path).map_err(|error| Exit::file(&path.display().to_string(), &error))?;
-            controller(out, model, storage, &endpoint, *device, &stop)
+            controller(out, model, storage, &endpoint, device, &stop)
         }
-        None => controller(out, model, vec![0xFF; STORAGE_LEN], &endpoint, *device, &stop),
+        None => controller(out, model, vec![0xFF; STORAGE_LEN], &endpoint, device, &stop),
     }
 }
 

@@ -10,10 +10,10 @@ mod record;
 mod sdo;
 pub(crate) mod session;
 pub(crate) mod sim;
-mod value;
+pub(crate) mod value;
 
 use core::sync::atomic::{AtomicBool, Ordering};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use crate::cli::Global;
 use crate::exit::Exit;
@@ -38,11 +38,18 @@ pub(crate) fn run(out: &Output, global: &Global, command: &Can) -> Result<(), Ex
     }
 }
 
-/// Set by a signal that asks the program to stop.
+static STOP: OnceLock<Arc<AtomicBool>> = OnceLock::new();
+
+/// Set by a signal that asks the program to stop, and by [`stop`].
 pub(crate) fn stop_flag() -> Result<Arc<AtomicBool>, Exit> {
-    let stop = Arc::new(AtomicBool::new(false));
-    let flag = Arc::clone(&stop);
-    ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed))
-        .map_err(|error| Exit::trouble(error.to_string()))?;
-    Ok(stop)
+    let flag = Arc::clone(STOP.get_or_init(Arc::default));
+    ctrlc::set_handler(stop).map_err(|error| Exit::trouble(error.to_string()))?;
+    Ok(flag)
+}
+
+/// Asks a command that runs until it is stopped to stop.
+pub(crate) fn stop() {
+    if let Some(flag) = STOP.get() {
+        flag.store(true, Ordering::Relaxed);
+    }
 }

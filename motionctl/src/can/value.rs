@@ -131,7 +131,7 @@ pub(crate) fn encode(text: &str, data_type: DataType) -> Result<Vec<u8>, Exit> {
 }
 
 /// Bytes in hex, with blanks or without.
-pub(super) fn bytes(text: &str) -> Option<Vec<u8>> {
+pub(crate) fn bytes(text: &str) -> Option<Vec<u8>> {
     let digits: Vec<char> = text.chars().filter(|c| !c.is_whitespace()).collect();
     let byte = |pair: &[char]| match pair {
         [high, low] => Some((high.to_digit(16)? * 16 + low.to_digit(16)?) as u8),

@@ -1,6 +1,5 @@
 //! `eds convert`: the same device in another format, or configured.
 
-use std::io::Write;
 use std::path::Path;
 
 use canopen_master::eds::{self, Device, Format, Reading};
@@ -49,7 +48,7 @@ pub(super) fn run(
     let to_stdout = output.as_os_str() == "-";
     if !dry_run {
         if to_stdout {
-            std::io::stdout().write_all(&written).map_err(|error| Exit::file("standard output", &error))?;
+            crate::output::put(&written);
             return Ok(());
         }
         crate::output::write_beside(output, &written)?;

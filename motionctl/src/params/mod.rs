@@ -196,6 +196,9 @@ fn set(out: &Output, global: &Global, line: &Line, pairs: &[String], save: bool)
         }
         return Ok(());
     }
+    if save {
+        out.confirm_on_terminal(global.yes, "Save the parameters to the device's flash?")?;
+    }
     transfer::write(out, &mut client, &wanted, &old, save)?;
     let values = wanted.iter().map(|(entry, value)| (entry.index(), *value)).collect();
     print(out, &values, &display);

@@ -91,14 +91,12 @@ fn judge(out: &Output, client: &mut Client, index: i32) -> Result<(), Exit> {
     });
     let name =
         u16::try_from(index).ok().and_then(get).map_or(format!("[{index}]"), |entry| entry.to_string());
-    match reason.map(|finding| finding.rule) {
-        Some(rule) if rule.code.is_warning() => {
-            out.remark(format!("{name}: {}", rule.message));
+    match reason {
+        Some(finding) if finding.rule.code.is_warning() => {
+            out.remark(format!("{name}: {}", finding.rule.message));
             Ok(())
         }
-        Some(rule) => {
-            Err(Exit::refused(format!("the loader refused {name}: {} ({})", rule.message, rule.clause)))
-        }
+        Some(finding) => Err(Exit::refused(format!("the loader refused {}", finding.explain(&values)))),
         None => Err(Exit::refused(format!("the loader refused {name}"))),
     }
 }
@@ -178,6 +176,10 @@ fn apply(
             println!("{} of {} parameters would be written, loaded and saved", changes.len(), wanted.len());
         });
         return Ok(());
+    }
+    if !changes.is_empty() {
+        let question = format!("Write {} parameters to the device's flash?", changes.len());
+        out.confirm_on_terminal(global.yes, &question)?;
     }
     write(out, client, &changes, &old, true)?;
     let found = read(out, client, &entries)?;

@@ -1,6 +1,5 @@
 //! `CONFIG.toml` of `motionctl run`.
 
-use core::time::Duration;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -9,6 +8,7 @@ use motion_core::parameters::{Values, find};
 use motion_io::endpoint::{CanEndpoint, Endpoint};
 use serde::Deserialize;
 
+use super::step::Step;
 use crate::exit::Exit;
 
 #[derive(Debug, Deserialize)]
@@ -153,6 +153,13 @@ pub(super) enum BusName {
     Can2,
 }
 
+impl BusName {
+    /// Place among the buses of a controller, 0 or 1.
+    pub(super) const fn at(self) -> usize {
+        self as usize
+    }
+}
+
 #[derive(Debug, Clone, Deserialize)]
 #[serde(tag = "kind", rename_all = "lowercase", deny_unknown_fields)]
 pub(super) enum Simulated {
@@ -224,68 +231,41 @@ pub(super) struct LimitSection {
     pub(super) opener: bool,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub(super) enum Action {
-    Power,
-    Home,
-    MoveAbsolute,
-    MoveRelative,
-    MoveVelocity,
-    Jog,
-    Stop,
-    Halt,
-    Reset,
-    SetPosition,
-}
-
-impl Action {
-    pub(super) const fn name(self) -> &'static str {
-        match self {
-            Self::Power => "power",
-            Self::Home => "home",
-            Self::MoveAbsolute => "move-absolute",
-            Self::MoveRelative => "move-relative",
-            Self::MoveVelocity => "move-velocity",
-            Self::Jog => "jog",
-            Self::Stop => "stop",
-            Self::Halt => "halt",
-            Self::Reset => "reset",
-            Self::SetPosition => "set-position",
-        }
-    }
-}
-
-/// One step of the program.
-#[derive(Debug, Clone, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Step {
-    /// Seconds since the start.
-    pub(super) at: f64,
-    #[serde(rename = "do")]
-    pub(super) action: Action,
-    pub(super) axis: u8,
-    pub(super) position: Option<i32>,
-    pub(super) distance: Option<i32>,
-    pub(super) velocity: Option<i32>,
-    /// Of jog: direction and speed.
-    #[serde(default = "yes")]
-    pub(super) forward: bool,
-    #[serde(default)]
-    pub(super) fast: bool,
-    /// Of power: on or off.
-    #[serde(default = "yes")]
-    pub(super) on: bool,
-    /// Seconds that jog, stop or a velocity is held.
-    #[serde(rename = "for")]
-    pub(super) duration: Option<f64>,
-}
-
-const fn yes() -> bool {
-    true
-}
-
 impl Config {
+    /// A controller without program and simulated devices: `sim controller` with CAN buses. Parameters
+    /// are `KEY=VALUE`.
+    pub(super) fn of_controller(
+        model: u16,
+        device_number: Option<u8>,
+        serial: Option<&str>,
+        can: [Option<&str>; 2],
+        parameters: &[String],
+    ) -> Result<Self, Exit> {
+        let [can1, can2] =
+            can.map(|can| can.map(|endpoint| Can { endpoint: endpoint.into(), bitrate: None }));
+        let serial = serial.map(|endpoint| Serial {
+            port: ComPort::Com2,
+            endpoint: endpoint.into(),
+            _protocol: Protocol::Lb2,
+        });
+        let pair = |pair: &String| match pair.split_once('=') {
+            Some((key, value)) => Ok((key.into(), Setting::Text(value.into()))),
+            None => Err(Exit::usage(format!("--set {pair}: KEY=VALUE expected"))),
+        };
+        let config = Self {
+            controller: ControllerSection { model, device_number, state: None },
+            serial: serial.into_iter().collect(),
+            can1,
+            can2,
+            parameters: parameters.iter().map(pair).collect::<Result<_, _>>()?,
+            extension: None,
+            simulate: Vec::new(),
+            program: Vec::new(),
+        };
+        config.check()?;
+        Ok(config)
+    }
+
     pub(super) fn read(path: &Path) -> Result<Self, Exit> {
         let name = path.display().to_string();
         let text = std::fs::read_to_string(path).map_err(|error| Exit::file(&name, &error))?;
@@ -305,6 +285,9 @@ impl Config {
         self.model()?;
         for step in &self.program {
             step.check()?;
+            if let Some(bus) = step.bus.filter(|bus| self.can(*bus).is_none()) {
+                return Err(Exit::usage(format!("{}: {bus:?} is not connected", step.words())));
+            }
         }
         for device in &self.simulate {
             if let Simulated::Drive { node, .. } | Simulated::Io { node, .. } = device
@@ -354,35 +337,6 @@ impl Config {
     }
 }
 
-impl Step {
-    fn check(&self) -> Result<(), Exit> {
-        let what = self.action.name();
-        let missing = |field| Exit::usage(format!("{what} at {} s: {field} is missing", self.at));
-        if !(self.at >= 0.0 && self.at.is_finite()) {
-            return Err(Exit::usage(format!("{what}: at = {}, a time from 0 on expected", self.at)));
-        }
-        if !(1..=6).contains(&self.axis) {
-            return Err(Exit::usage(format!("{what} at {} s: axis {}, 1 to 6 expected", self.at, self.axis)));
-        }
-        match self.action {
-            Action::MoveAbsolute | Action::SetPosition if self.position.is_none() => Err(missing("position")),
-            Action::MoveRelative if self.distance.is_none() => Err(missing("distance")),
-            Action::MoveVelocity if self.velocity.is_none() => Err(missing("velocity")),
-            Action::Jog if self.duration.is_none() => Err(missing("for")),
-            _ => Ok(()),
-        }
-    }
-
-    pub(super) fn begin(&self) -> Duration {
-        Duration::from_secs_f64(self.at)
-    }
-
-    /// When what is held ends.
-    pub(super) fn end(&self) -> Option<Duration> {
-        self.duration.map(|duration| self.begin().saturating_add(Duration::from_secs_f64(duration.max(0.0))))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -415,13 +369,24 @@ mod tests {
 
     #[test]
     fn mistakes_are_named() {
-        let error = |text| read(text).unwrap_err();
+        let error = |text: &str| read(text).unwrap_err();
         assert!(error("[controller]\nmodel = 8232\n").contains("8230, 8231, 8235 or 8236"));
         assert!(error("[controler]\n").contains("controler"));
         assert!(
             error("[[program]]\nat = 1\ndo = \"move-absolute\"\naxis = 1\n").contains("position is missing")
         );
         assert!(error("[[program]]\nat = 1\ndo = \"home\"\naxis = 7\n").contains("1 to 6"));
+        let can = |step: &str| {
+            error(&format!("[can1]\nendpoint = \"virtual:x\"\n[[program]]\nat = 1\nbus = \"can1\"\n{step}\n"))
+        };
+        assert!(can("do = \"write\"\ndata = \"01\"").contains("object is missing"));
+        assert!(can("do = \"write\"\nobject = 5\ndata = \"01\"").contains("object 5, 1 to 4 expected"));
+        assert!(can("do = \"send\"\nchannel = 15\ndata = \"01\"").contains("15"));
+        assert!(can("do = \"send\"\nchannel = 1\ndata = \"0\"").contains("pairs of hex digits"));
+        assert!(can("do = \"home\"").contains("axis is missing"));
+        assert!(
+            error("[[program]]\nat = 1\ndo = \"scan\"\nbus = \"can1\"\n").contains("Can1 is not connected")
+        );
         assert!(
             error("[[simulate]]\nkind = \"drive\"\nbus = \"can1\"\nnode = 1\n").contains("not connected")
         );

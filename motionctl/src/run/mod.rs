@@ -3,6 +3,7 @@
 mod buses;
 pub(crate) mod cli;
 mod config;
+mod data;
 mod modbus;
 mod pace;
 mod plants;
@@ -10,14 +11,17 @@ mod program;
 mod remote;
 mod report;
 mod serial;
+mod step;
 
 use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
+use std::path::Path;
 
-use lb2::device::Device;
+use lb2::device::Device as _;
 use lb2::telegram::BANK_LEN;
-use motion_core::application::State;
+use motion_core::application::{AxisStatus, State};
 use motion_core::io::Outputs;
+use motion_core::parameters::get;
 use motion_core::storage::Storage;
 use motion_core::{Controller, STORAGE_LEN};
 use motion_io::port::{Role, open};
@@ -30,9 +34,10 @@ use crate::storage::FileStorage;
 use buses::{Bus, Devices};
 use config::{BusName, ComPort, Config};
 use pace::Pace;
-use program::Program;
+use program::{Outcome, Program, Subject};
 use report::Report;
 use serial::Line;
+use step::Action;
 
 /// Longest time that axes have to come to standstill when the program ends.
 const STANDSTILL: Duration = Duration::from_secs(20);
@@ -46,29 +51,65 @@ pub(crate) fn run(out: &Output, arguments: &cli::Run) -> Result<(), Exit> {
         ),
         None => None,
     };
-    let stop = stop_flag()?;
-    let recorder = arguments.record.as_deref().map(Recorder::create).transpose()?;
-    let ended = match &config.controller.state {
+    let flash = match &config.controller.state {
         Some(directory) => {
-            let name = directory.display().to_string();
-            std::fs::create_dir_all(directory).map_err(|error| Exit::file(&name, &error))?;
-            let storage =
-                FileStorage::open(&directory.join("flash.bin")).map_err(|error| Exit::file(&name, &error))?;
-            control(out, &config, storage, limit, &stop, recorder.as_ref())
+            std::fs::create_dir_all(directory)
+                .map_err(|error| Exit::file(&directory.display().to_string(), &error))?;
+            Some(directory.join("flash.bin"))
         }
-        None => control(out, &config, vec![0xFF; STORAGE_LEN], limit, &stop, recorder.as_ref()),
+        None => None,
     };
+    let recorder = arguments.record.as_deref().map(Recorder::create).transpose()?;
+    let ended = begin(out, &config, flash.as_deref(), limit, recorder.as_ref());
     // What was recorded is kept whatever ended the run.
     let recorded = recorder.map_or(Ok(()), Recorder::finish);
     ended.and(recorded)
 }
 
-/// Sets the configuration's parameters, which must pass the loader.
+/// What `sim controller` runs on CAN buses.
+pub(crate) struct Device<'a> {
+    pub(crate) model: u16,
+    pub(crate) number: Option<u8>,
+    pub(crate) serial: Option<&'a str>,
+    pub(crate) can: [Option<&'a str>; 2],
+    /// `KEY=VALUE`
+    pub(crate) parameters: &'a [String],
+    /// File for flash and retained values.
+    pub(crate) state: Option<&'a Path>,
+}
+
+pub(crate) fn device(out: &Output, device: &Device<'_>) -> Result<(), Exit> {
+    let Device { model, number, serial, can, parameters, state } = *device;
+    begin(out, &Config::of_controller(model, number, serial, can, parameters)?, state, None, None)
+}
+
+/// With its flash in a file, or in memory.
+fn begin(
+    out: &Output,
+    config: &Config,
+    flash: Option<&Path>,
+    limit: Option<Duration>,
+    recorder: Option<&Recorder>,
+) -> Result<(), Exit> {
+    let stop = stop_flag()?;
+    match flash {
+        Some(file) => {
+            let storage =
+                FileStorage::open(file).map_err(|error| Exit::file(&file.display().to_string(), &error))?;
+            control(out, config, storage, limit, &stop, recorder)
+        }
+        None => control(out, config, vec![0xFF; STORAGE_LEN], limit, &stop, recorder),
+    }
+}
+
+/// Sets the configuration's parameters, which must pass the loader. They are effective as if the controller
+/// were switched on with them.
 fn set_up<S: Storage>(controller: &mut Controller<S, Vec<u8>>, config: &Config) -> Result<(), Exit> {
     for (index, value) in config.parameters()? {
         let answer = controller.write_parameter(index, value);
         if answer.code.is_error() {
-            return Err(Exit::usage(format!("[{index:03}] = {value}: {}", answer.text)));
+            let name = get(index).map_or(format!("[{index:03}]"), |entry| entry.to_string());
+            return Err(Exit::usage(format!("{name} = {value}: {}", answer.text)));
         }
     }
     let mut fault = None;
@@ -76,11 +117,11 @@ fn set_up<S: Storage>(controller: &mut Controller<S, Vec<u8>>, config: &Config) 
         fault.get_or_insert(finding);
     });
     match fault {
-        Some(finding) if !loaded => Err(Exit::usage(format!(
-            "[{:03}]: {} ({})",
-            finding.index, finding.rule.message, finding.rule.clause
-        ))),
-        _ => Ok(()),
+        Some(finding) if !loaded => Err(Exit::usage(finding.explain(controller.edited()).to_string())),
+        _ => {
+            controller.restart_buses();
+            Ok(())
+        }
     }
 }
 
@@ -95,8 +136,9 @@ fn control(
     let model = config.model()?;
     let mut controller = Controller::power_on(model, storage, vec![0; BANK_LEN]);
     set_up(&mut controller, config)?;
+    data::set_up(&mut controller, &config.program)?;
     let mut machine = plants::machine(&config.simulate)?;
-    let mut program = Program::new(&config.program);
+    let mut program = Program::new(&config.program)?;
     let mut extension = config.extension.as_ref().map(config::Extension::open).transpose()?;
     if let Some(server) = &mut extension {
         // The sizes of the images are known before anybody knows the address.
@@ -130,7 +172,10 @@ fn control(
     }
     let mut report = Report::new(out);
     let mut pace = Pace::new();
-    report.ready(pace.now(), model.number(), controller.cycle_time());
+    let role = |at: usize| controller.bus(at).map(|bus| (at, bus.role()));
+    let roles: Vec<_> = connected.iter().map(|(at, _)| *at).filter_map(role).collect();
+    report.ready(pace.now(), model.number(), controller.cycle_time(), &roles);
+    let mut told: [data::Told; 2] = Default::default();
     let mut outputs = Outputs::default();
     let mut stored = controller.failures().total();
     let mut ending = None;
@@ -142,7 +187,14 @@ fn control(
         for (at, port) in &connected {
             if let Some(bus) = controller.bus(*at) {
                 port.receive(now, bus, |event| report.bus(now, *at, &event.to_string()))?;
+                told[*at].tell(&report, now, *at, bus);
             }
+        }
+        let resting = |status: &AxisStatus| matches!(status.state, State::Disabled | State::Standstill);
+        let at_rest = (0..6).filter_map(|axis| controller.axis_status(axis)).all(resting);
+        for at in program.take_scans() {
+            let outcome = if at_rest && controller.scan(at) { Outcome::Done } else { Outcome::Refused };
+            report.step(now, (Subject::Bus(at), Action::Scan, outcome));
         }
         let inputs = machine.run(cycle.as_millis() as u32, &outputs);
         if let Some(bus) = &mut extension {
@@ -173,8 +225,8 @@ fn control(
         let new = total.wrapping_sub(core::mem::replace(&mut stored, total)) as usize;
         let list = controller.failures().stored();
         list.iter().skip(list.len().saturating_sub(new)).for_each(|&failure| report.failure(now, failure));
-        for (axis, action, outcome) in program.ended.drain(..) {
-            report.step(now, axis, action.name(), outcome);
+        for ended in program.ended.drain(..) {
+            report.step(now, ended);
         }
         report.cycle(now, &pace.jitter);
         if ending.is_none() && (stop.load(Ordering::Relaxed) || limit.is_some_and(|limit| now >= limit)) {

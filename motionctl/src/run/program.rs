@@ -6,9 +6,12 @@ use motion_core::application::blocks::{
     Halt, Home, Jog, MoveAbsolute, MoveRelative, MoveVelocity, Outputs, Power, Reset, SetPosition, Stop,
 };
 use motion_core::application::{Application, MotionError, Plc, State};
+use pdo::Payload;
 
-use super::config::{Action, Step};
+use super::config::BusName;
 use super::remote::Remote;
+use super::step::{Action, Step};
+use crate::exit::Exit;
 
 /// A step's function block: runs one cycle, with its inputs asked for or not.
 type Block = Box<dyn FnMut(&mut Plc<'_>, bool) -> Outputs>;
@@ -19,12 +22,24 @@ pub(super) enum Outcome {
     Done,
     Aborted,
     Failed(MotionError),
+    /// A scan while an axis moves (4.3.4.4).
+    Refused,
 }
+
+/// What a step acts on: an axis, 1…6, or a bus, 0 or 1.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Subject {
+    Axis(u8),
+    Bus(usize),
+}
+
+/// A step that has ended.
+pub(super) type Ended = (Subject, Action, Outcome);
 
 struct Running {
     begin: Duration,
     end: Option<Duration>,
-    axis: u8,
+    subject: Subject,
     action: Action,
     block: Block,
     over: bool,
@@ -40,21 +55,38 @@ pub(super) struct Program {
     stops: Vec<(Stop, Power)>,
     /// Axes by way of the extension module.
     remote: Option<Remote>,
-    /// Steps that have ended: axis, action, outcome.
-    pub(super) ended: Vec<(u8, Action, Outcome)>,
+    /// Steps that have ended.
+    pub(super) ended: Vec<Ended>,
 }
 
 impl Program {
-    pub(super) fn new(steps: &[Step]) -> Self {
-        let steps = steps.iter().map(|step| Running {
-            begin: step.begin(),
-            end: step.end(),
-            axis: step.axis,
-            action: step.action,
-            block: block(step),
-            over: false,
-        });
-        Self { steps: steps.collect(), ..Self::default() }
+    pub(super) fn new(steps: &[Step]) -> Result<Self, Exit> {
+        let running = |step: &Step| {
+            Ok(Running {
+                begin: step.begin(),
+                end: step.end(),
+                subject: match (step.axis, step.bus) {
+                    (None, Some(bus)) => Subject::Bus(bus.at()),
+                    (axis, _) => Subject::Axis(axis.unwrap_or(0)),
+                },
+                action: step.action,
+                block: block(step)?,
+                over: false,
+            })
+        };
+        Ok(Self { steps: steps.iter().map(running).collect::<Result<_, Exit>>()?, ..Self::default() })
+    }
+
+    /// The scans whose time has come: they are the device's, not the application's.
+    pub(super) fn take_scans(&mut self) -> impl Iterator<Item = usize> {
+        let now = self.now;
+        self.steps.iter_mut().filter_map(move |step| match step.subject {
+            Subject::Bus(at) if step.action == Action::Scan && !step.over && now >= step.begin => {
+                step.over = true;
+                Some(at)
+            }
+            _ => None,
+        })
     }
 
     /// With axes that the extension module's process image moves.
@@ -101,7 +133,7 @@ impl Application for Program {
             remote.cycle(plc);
         }
         for step in &mut self.steps {
-            if step.over || self.now < step.begin {
+            if step.over || self.now < step.begin || step.action == Action::Scan {
                 continue;
             }
             let asked = step.end.is_none_or(|end| self.now < end);
@@ -116,7 +148,7 @@ impl Application for Program {
                 continue;
             };
             step.over = true;
-            self.ended.push((step.axis, step.action, outcome));
+            self.ended.push((step.subject, step.action, outcome));
         }
     }
 }
@@ -131,11 +163,20 @@ macro_rules! executed {
     }};
 }
 
-fn block(step: &Step) -> Block {
-    let axis = step.axis;
+/// An action that is done as soon as it is begun.
+fn at_once(mut action: impl FnMut(&mut Plc<'_>) + 'static) -> Block {
+    Box::new(move |plc, _| {
+        action(plc);
+        Outputs { done: true, ..Outputs::default() }
+    })
+}
+
+fn block(step: &Step) -> Result<Block, Exit> {
+    let axis = step.axis.unwrap_or(0);
+    let at = step.bus.map_or(0, BusName::at);
     let speed = step.velocity.map(i32::unsigned_abs);
     let (position, distance) = (step.position.unwrap_or(0), step.distance.unwrap_or(0));
-    match step.action {
+    Ok(match step.action {
         Action::Power => {
             let mut power = Power::new(axis);
             power.enable = step.on;
@@ -179,5 +220,22 @@ fn block(step: &Step) -> Block {
             block.position = position;
             executed!(block)
         }
-    }
+        Action::Write => {
+            let (object, data) =
+                (usize::from(step.object.unwrap_or(0)), Payload::from_slice(&step.payload()?));
+            at_once(move |plc| {
+                plc.can[at].image().write(object, data);
+            })
+        }
+        Action::Send => {
+            let (channel, data) = (step.channel()?, step.payload()?);
+            at_once(move |plc| {
+                if let Some(link) = plc.can[at].link() {
+                    // The channel has been set up to be sent on, and the length is that of a frame.
+                    let _ = link.write(channel, &data);
+                }
+            })
+        }
+        Action::Scan => at_once(|_| ()),
+    })
 }

@@ -3,14 +3,15 @@
 use core::time::Duration;
 
 use canopen_master::NodeSet;
+use canopen_master::scan::BusState;
 use lb2::code::StoredFailure;
 use motion_core::application::{AxisStatus, State};
-use motion_core::bus::CanBus;
+use motion_core::bus::{CanBus, Role};
 use motion_core::failure;
 use serde_json::{Value, json};
 
 use super::pace::Jitter;
-use super::program::Outcome;
+use super::program::{Ended, Outcome, Subject};
 use crate::output::Output;
 
 const fn state_name(state: State) -> &'static str {
@@ -25,12 +26,21 @@ const fn state_name(state: State) -> &'static str {
     }
 }
 
+const fn role_name(role: Role) -> &'static str {
+    match role {
+        Role::Master => "master",
+        Role::Slave => "slave",
+        Role::Link => "can-link",
+    }
+}
+
 /// Tells what changed since the last cycle.
 pub(super) struct Report<'a> {
     out: &'a Output,
     states: [State; 6],
     /// Nodes that have booted, by bus.
     ready: [NodeSet; 2],
+    scanning: [bool; 2],
     summary: Duration,
     cycles: u64,
 }
@@ -41,6 +51,7 @@ impl<'a> Report<'a> {
             out,
             states: [State::Disabled; 6],
             ready: [NodeSet::EMPTY; 2],
+            scanning: [false; 2],
             summary: Duration::from_secs(1),
             cycles: 0,
         }
@@ -54,9 +65,35 @@ impl<'a> Report<'a> {
         self.out.document(document, || self.out.say(&format!("{:10.3} s  {text}", at.as_secs_f64())));
     }
 
-    pub(super) fn ready(&self, at: Duration, model: u16, cycle: Duration) {
-        let text = format!("GEL {model} runs, cycle {} ms", cycle.as_millis());
-        self.event(at, "ready", json!({ "model": model, "cycle_ms": cycle.as_millis() as u64 }), &text);
+    /// The controller runs; `roles` are those of the buses that are connected, by place.
+    pub(super) fn ready(&self, at: Duration, model: u16, cycle: Duration, roles: &[(usize, Role)]) {
+        let mut text = format!("GEL {model} runs, cycle {} ms", cycle.as_millis());
+        let mut buses = Vec::new();
+        for (bus, role) in roles {
+            let (number, role) = (bus + 1, role_name(*role));
+            text += &format!(", CAN {number}: {role}");
+            buses.push(json!({ "bus": number, "role": role }));
+        }
+        let fields = json!({ "model": model, "cycle_ms": cycle.as_millis() as u64, "buses": buses });
+        self.event(at, "ready", fields, &text);
+    }
+
+    pub(super) fn object(&self, at: Duration, bus: usize, number: usize, node: u8, data: &str) {
+        let (bus, object) = (bus + 1, format!("IN {number}"));
+        let fields = json!({ "bus": bus, "object": object, "node": node, "data": data });
+        self.event(at, "object", fields, &format!("CAN {bus}: {object} of node {node}: {data}"));
+    }
+
+    pub(super) fn channel(&self, at: Duration, bus: usize, channel: u8, data: &str) {
+        let bus = bus + 1;
+        let fields = json!({ "bus": bus, "channel": channel, "data": data });
+        self.event(at, "channel", fields, &format!("CAN {bus}: channel {channel}: {data}"));
+    }
+
+    pub(super) fn conflict(&self, at: Duration, bus: usize, channel: u8) {
+        let bus = bus + 1;
+        let text = format!("CAN {bus}: another device sends on channel {channel} too");
+        self.event(at, "conflict", json!({ "bus": bus, "channel": channel }), &text);
     }
 
     pub(super) fn axis(&mut self, at: Duration, axis: usize, status: &AxisStatus) {
@@ -74,8 +111,12 @@ impl<'a> Report<'a> {
         self.event(at, "bus", json!({ "bus": number, "text": text }), &format!("CAN {number}: {text}"));
     }
 
-    /// Nodes that have booted, or are to boot anew.
+    /// How a scan ended, and nodes that have booted, or are to boot anew.
     pub(super) fn nodes(&mut self, at: Duration, bus: usize, can: &CanBus) {
+        let scanning = can.is_scanning();
+        if core::mem::replace(&mut self.scanning[bus], scanning) && !scanning {
+            self.scanned(at, bus + 1, can.state());
+        }
         let before = core::mem::replace(&mut self.ready[bus], can.ready());
         let number = bus + 1;
         let changes =
@@ -88,6 +129,12 @@ impl<'a> Report<'a> {
         }
     }
 
+    fn scanned(&self, at: Duration, number: usize, state: BusState) {
+        let state = if state == BusState::Ok { "OK" } else { "BUS WARN" };
+        let fields = json!({ "bus": number, "state": state });
+        self.event(at, "scan", fields, &format!("CAN {number}: scanned: {state}"));
+    }
+
     pub(super) fn failure(&self, at: Duration, stored: StoredFailure) {
         let StoredFailure { axis, failure: number } = stored;
         let words = failure::text(number).unwrap_or("unknown failure");
@@ -95,14 +142,22 @@ impl<'a> Report<'a> {
         self.event(at, "failure", fields, &format!("axis {axis}: failure {}: {words}", number.0));
     }
 
-    pub(super) fn step(&self, at: Duration, axis: u8, action: &str, outcome: Outcome) {
+    pub(super) fn step(&self, at: Duration, (subject, action, outcome): Ended) {
         let (word, error) = match outcome {
             Outcome::Done => ("done", None),
             Outcome::Aborted => ("aborted", None),
             Outcome::Failed(error) => ("error", Some(error)),
+            Outcome::Refused => ("refused: an axis moves", None),
         };
-        let mut fields = json!({ "axis": axis, "do": action, "outcome": word });
-        let mut text = format!("axis {axis}: {action}: {word}");
+        let action = action.name();
+        let (mut fields, mut text) = match subject {
+            Subject::Axis(axis) => (json!({ "axis": axis }), format!("axis {axis}")),
+            Subject::Bus(bus) => (json!({ "bus": bus + 1 }), format!("CAN {}", bus + 1)),
+        };
+        text += &format!(": {action}: {word}");
+        if let Some(fields) = fields.as_object_mut() {
+            fields.extend([("do".into(), json!(action)), ("outcome".into(), json!(word))]);
+        }
         if let (Some(error), Some(fields)) = (error, fields.as_object_mut()) {
             fields.insert("error".into(), json!(error.0));
             fields.insert("text".into(), json!(error.to_string()));
