@@ -213,6 +213,19 @@ fn channels_of_can_link() {
     assert_eq!(second["conflict"], true);
     let once = net.can(&["link", "set", "4", "01", "--for", "0.1"], 0);
     assert_eq!((once["data"].as_str(), once["conflict"].as_bool()), (Some("01"), Some(false)));
+    // Typed values.
+    let typed =
+        ["can", "link", "set", "5", "-1250", "--type", "i32", "--period", "0.01", "--can", &net.endpoint];
+    let (_typed, _) = Running::start(&typed, net.directory.path());
+    let list = net.can(&["link", "list", "--for", "0.5", "--type", "i32"], 0);
+    let channel =
+        |number: usize| (&list["channels"][number - 1]["data"], &list["channels"][number - 1]["value"]);
+    assert_eq!(channel(5), (&json!("1EFBFFFF"), &json!(-1250)));
+    assert_eq!(channel(3), (&json!("E204"), &Value::Null), "two bytes are no such value");
+    assert_eq!(net.run(&["link", "set", "5", "70000", "--type", "u16"]).status.code(), Some(2));
+    assert_eq!(net.run(&["link", "set", "5", "1", "--type", "word"]).status.code(), Some(2));
+    let plan = net.run(&["link", "set", "5", "00", "--dry-run", "--can", "socketcan:nothing"]);
+    assert_eq!(plan.status.code(), Some(0));
     for wrong in [["15", "00"], ["1", "0"], ["1", "000102030405060708"]] {
         let [channel, data] = wrong;
         assert_eq!(net.run(&["link", "set", channel, data]).status.code(), Some(2), "{wrong:?}");

@@ -95,6 +95,29 @@ fn a_screen_dump_has_no_times_and_its_direction_is_no_bus() {
     assert_eq!(without[0]["kind"], "unknown");
 }
 
+/// Every line that concerns a channel of CAN Link names it.
+#[test]
+fn channels_of_can_link_have_their_names() {
+    let bench = Bench::new();
+    let values = (0..8).map(|n| format!("({n}.000000) can0 103#E20{n}\n"));
+    let log: String =
+        values.chain(["(9.000000) can0 10E#\n".into(), "(9.100000) can0 10F#01\n".into()]).collect();
+    std::fs::write(bench.path("log"), log).unwrap();
+    let text = bench.run(&["decode", "log", "--can-link", "--frames"]).ends(0).stdout();
+    for words in [
+        "103 Data [2] E2 00  can-link channel 3\n",
+        "CAN Link  channel 3 begins: E2 00\n",
+        "CAN Link  channel 3: E2 03\n",
+        "CAN Link  channel 3: E2 04 (and so on)\n",
+        "CAN Link  channel 14 begins: nothing\n",
+        "bus       identifier of no known service: 10F Data [1] 01\n",
+        "  CAN Link channel 3: 8 times, every 1000.0 ms, 7 changes\n",
+    ] {
+        assert!(text.contains(words), "{words:?} expected in:\n{text}");
+    }
+    assert!(!text.contains("channel 3: E2 05\n") && !text.contains("identifier 103h"), "{text}");
+}
+
 #[test]
 fn pdo_values_by_a_mapping_from_the_traffic() {
     let log = "can0 601#23001A0110006460\ncan0 581#60001A0100000000\ncan0 181#FEFF\n";

@@ -293,6 +293,8 @@ pub(crate) enum LinkCommand {
         #[command(flatten)]
         line: CanLine,
         #[command(flatten)]
+        content: Content,
+        #[command(flatten)]
         stream: Stream,
     },
     /// Values as they come
@@ -300,14 +302,19 @@ pub(crate) enum LinkCommand {
         #[command(flatten)]
         line: CanLine,
         #[command(flatten)]
+        content: Content,
+        #[command(flatten)]
         stream: Stream,
     },
     /// Send a value on a channel, once or at a period; status 1 if another device sends on it too
     Set {
         /// 1 to 14
         channel: u8,
-        /// Up to 8 bytes in hex
+        /// Up to 8 bytes in hex, or a value of the type
+        #[arg(allow_negative_numbers = true)]
         data: String,
+        #[command(flatten)]
+        content: Content,
         /// Seconds between two frames, until stopped or for `--for` so long
         #[arg(long, value_name = "S")]
         period: Option<f64>,
@@ -316,4 +323,12 @@ pub(crate) enum LinkCommand {
         #[command(flatten)]
         stream: Stream,
     },
+}
+
+/// How the bytes of channels are to be understood.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct Content {
+    /// bool, u8, i8, u16, i16, u24 … u64, i64, f32, f64, string, bytes; little-endian
+    #[arg(long = "type", value_name = "T")]
+    pub(crate) data_type: Option<String>,
 }

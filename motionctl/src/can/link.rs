@@ -4,15 +4,16 @@ use core::sync::atomic::Ordering;
 use core::time::Duration;
 
 use can_link::{Channel, Event, Link, Role, Setting, Trigger};
+use canopen_master::data_type::DataType;
 use motion_io::can::{Driver, Engine, open};
 use pdo::Frame;
 use serde_json::{Value, json};
 
-use super::cli::{CanLine, LinkCommand, Stream};
+use super::cli::{CanLine, Content, LinkCommand, Stream};
 use super::network::STEP;
 use super::session::{duration, endpoint, gone};
 use super::stop_flag;
-use super::value::{bytes, hex};
+use super::value::{bytes, decode, encode, hex, named_type};
 use crate::cli::Global;
 use crate::exit::Exit;
 use crate::output::Output;
@@ -46,17 +47,24 @@ impl Engine for Wire {
 struct Device {
     driver: Driver,
     wire: Wire,
+    /// What the bytes of a channel are, where it was told.
+    content: Option<DataType>,
 }
 
 impl Device {
-    fn open(global: &Global, line: &CanLine, own: Option<(Channel, Setting)>) -> Result<Self, Exit> {
+    fn open(
+        global: &Global,
+        line: &CanLine,
+        content: Option<DataType>,
+        own: Option<(Channel, Setting)>,
+    ) -> Result<Self, Exit> {
         let mut link = Link::new();
         for channel in Channel::all() {
             let setting = own.filter(|(own, _)| *own == channel).map_or(Setting::RECEIVE, |(_, own)| own);
             link.set(channel, setting).map_err(|error| Exit::usage(error.to_string()))?;
         }
         let port = open(&endpoint(global, line)?).map_err(|error| Exit::trouble(error.to_string()))?;
-        Ok(Self { driver: Driver::new(port), wire: Wire(link) })
+        Ok(Self { driver: Driver::new(port), wire: Wire(link), content })
     }
 
     /// One turn until something comes, at most until `limit`.
@@ -79,13 +87,18 @@ impl Device {
     /// What a channel holds, as a JSON object.
     fn channel(&mut self, channel: Channel) -> Value {
         let received = self.wire.0.read(self.driver.now(), channel);
-        json!({
+        let mut document = json!({
             "channel": channel.number(),
             "data": received.map(|received| hex(received.data())),
             "age": received.map(|received| received.age.as_secs_f64()),
             "source": received.map(|_| "bus"),
             "conflict": self.wire.0.conflicts(channel) > 0,
-        })
+        });
+        if let Some(content) = self.content {
+            // Null where the bytes are no such value.
+            document["value"] = json!(received.and_then(|received| decode(received.data(), content).ok()));
+        }
+        document
     }
 }
 
@@ -95,20 +108,33 @@ fn limit(run: &Stream, default: Duration) -> Result<Duration, Exit> {
 
 pub(crate) fn run(out: &Output, global: &Global, command: &LinkCommand) -> Result<(), Exit> {
     match command {
-        LinkCommand::List { line, stream } => list(out, global, line, stream),
-        LinkCommand::Watch { line, stream } => watch(out, global, line, stream),
-        LinkCommand::Set { channel, data, period, line, stream } => {
+        LinkCommand::List { line, content, stream } => {
+            list(out, Device::open(global, line, content.data_type()?, None)?, stream)
+        }
+        LinkCommand::Watch { line, content, stream } => {
+            watch(out, Device::open(global, line, content.data_type()?, None)?, stream)
+        }
+        LinkCommand::Set { channel, data, content, period, line, stream } => {
             let channel = Channel::new(*channel).map_err(|error| Exit::usage(error.to_string()))?;
-            let data = bytes(data)
-                .ok_or_else(|| Exit::usage(format!("{data:?}: up to 8 pairs of hex digits expected")))?;
+            let data = match content.data_type()? {
+                Some(data_type) => encode(data, data_type)?,
+                None => bytes(data).ok_or_else(|| {
+                    Exit::usage(format!("{data:?}: up to 8 pairs of hex digits, or --type T expected"))
+                })?,
+            };
             set(out, global, line, (channel, &data), *period, stream)
         }
     }
 }
 
+impl Content {
+    fn data_type(&self) -> Result<Option<DataType>, Exit> {
+        self.data_type.as_deref().map(named_type).transpose()
+    }
+}
+
 /// All channels after listening for a while.
-fn list(out: &Output, global: &Global, line: &CanLine, run: &Stream) -> Result<(), Exit> {
-    let mut device = Device::open(global, line, None)?;
+fn list(out: &Output, mut device: Device, run: &Stream) -> Result<(), Exit> {
     device.run(limit(run, LISTEN)?, |_, _| {})?;
     let channels: Vec<Value> = Channel::all().map(|channel| device.channel(channel)).collect();
     out.document(json!({ "channels": &channels }), || {
@@ -121,21 +147,28 @@ fn list(out: &Output, global: &Global, line: &CanLine, run: &Stream) -> Result<(
     Ok(())
 }
 
-fn words(channel: &Value) -> String {
+/// The value where it is one, and the bytes.
+fn content(channel: &Value) -> String {
     let data = channel["data"].as_str().unwrap_or("");
+    match &channel["value"] {
+        Value::Null => data.into(),
+        value => format!("{value} ({data})"),
+    }
+}
+
+fn words(channel: &Value) -> String {
     let age = channel["age"].as_f64().unwrap_or(0.0);
-    format!("channel {:>2}: {data:16}  {age:.3} s ago", channel["channel"])
+    format!("channel {:>2}: {:16}  {age:.3} s ago", channel["channel"], content(channel))
 }
 
 /// Values as they come.
-fn watch(out: &Output, global: &Global, line: &CanLine, run: &Stream) -> Result<(), Exit> {
-    let mut device = Device::open(global, line, None)?;
+fn watch(out: &Output, mut device: Device, run: &Stream) -> Result<(), Exit> {
     device.run(limit(run, Duration::MAX)?, |device, event| {
         let Event::Received(channel) = event else { return };
         let t = device.driver.now().as_secs_f64();
         let mut document = device.channel(channel);
         document["t"] = json!(t);
-        let text = format!("{t:10.3}  channel {channel:>2}: {}", document["data"].as_str().unwrap_or(""));
+        let text = format!("{t:10.3}  channel {channel:>2}: {}", content(&document));
         out.line(document, || text);
     })
 }
@@ -155,7 +188,11 @@ fn set(
     };
     let setting = Setting { role: Role::Transmit(trigger), ..Setting::OFF };
     let limit = limit(run, default)?;
-    let mut device = Device::open(global, line, Some((channel, setting)))?;
+    if global.dry_run {
+        out.say(&format!("would send {} on channel {channel}", hex(data)));
+        return Ok(());
+    }
+    let mut device = Device::open(global, line, None, Some((channel, setting)))?;
     device.wire.0.write(channel, data).map_err(|error| Exit::usage(error.to_string()))?;
     if period.is_some() {
         let ready = json!({ "event": "ready", "channel": channel.number() });

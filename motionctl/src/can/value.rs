@@ -43,6 +43,15 @@ pub(crate) fn device(path: Option<&Path>) -> Result<Option<eds::Device>, Exit> {
     Ok(Some(reading.device))
 }
 
+/// A type by its name on the command line.
+pub(crate) fn named_type(name: &str) -> Result<DataType, Exit> {
+    let known = TYPES.iter().find(|(known, _)| known.eq_ignore_ascii_case(name));
+    let names = || TYPES.map(|(name, _)| name).join(", ");
+    known
+        .map(|(_, data_type)| *data_type)
+        .ok_or_else(|| Exit::usage(format!("--type {name}: one of {} expected", names())))
+}
+
 /// The type that was named, or that the device file gives the object.
 pub(crate) fn data_type(
     name: Option<&str>,
@@ -50,12 +59,7 @@ pub(crate) fn data_type(
     at: Address,
 ) -> Result<Option<DataType>, Exit> {
     if let Some(name) = name {
-        let known = TYPES.iter().find(|(known, _)| known.eq_ignore_ascii_case(name));
-        let names = || TYPES.map(|(name, _)| name).join(", ");
-        return match known {
-            Some((_, data_type)) => Ok(Some(*data_type)),
-            None => Err(Exit::usage(format!("--type {name}: one of {} expected", names()))),
-        };
+        return named_type(name).map(Some);
     }
     let own = device.and_then(|device| {
         let data_type = device.entry(at.index, at.sub)?.data_type?;

@@ -47,6 +47,7 @@ enum Cycle {
     Sync(u16),
     Time(u16),
     Pdo(u16, NodeId, PdoDirection, u16),
+    Channel(u16, u8),
     Heartbeat(u16, NodeId),
     Guarding(u16, NodeId),
     Identifier(u16, u32, bool),
@@ -240,8 +241,12 @@ impl<'a> Story<'a> {
         let time =
             record.time.map(|time| Time(time.0 - self.start.unwrap_or(0)).to_string()).unwrap_or_default();
         let copy = if record.loopback { "  (copy)" } else { "" };
+        let channel = match kind {
+            Kind::CanLink { channel } => format!(" channel {channel}"),
+            _ => String::new(),
+        };
         let bus = bus.unwrap_or("");
-        let _ = writeln!(self.out, "{time:>12}  {bus:<6}   · {:?}  {name}{copy}", record.frame);
+        let _ = writeln!(self.out, "{time:>12}  {bus:<6}   · {:?}  {name}{channel}{copy}", record.frame);
     }
 
     /// The counts, when the capture has ended.
@@ -261,6 +266,7 @@ impl<'a> Story<'a> {
                 Cycle::Pdo(bus, node, PdoDirection::Receive, number) => {
                     (bus, format!("node {node} RPDO {number}"))
                 }
+                Cycle::Channel(bus, channel) => (bus, format!("CAN Link channel {channel}")),
                 Cycle::Heartbeat(bus, node) => {
                     let state =
                         tracer.state(bus, node).map(|state| format!(", at last {state}")).unwrap_or_default();
@@ -283,11 +289,12 @@ impl<'a> Story<'a> {
                 }
                 _ => String::new(),
             };
-            let changes = match (cycle, count.changes) {
-                (Cycle::Pdo(..) | Cycle::Identifier(..), 0) => ", always the same".into(),
-                (Cycle::Pdo(..) | Cycle::Identifier(..), 1) => ", 1 change".into(),
-                (Cycle::Pdo(..) | Cycle::Identifier(..), changes) => format!(", {changes} changes"),
-                _ => String::new(),
+            let carries = matches!(cycle, Cycle::Pdo(..) | Cycle::Channel(..) | Cycle::Identifier(..));
+            let changes = match count.changes {
+                _ if !carries => String::new(),
+                0 => ", always the same".into(),
+                1 => ", 1 change".into(),
+                changes => format!(", {changes} changes"),
             };
             let _ = writeln!(self.out, "  {bus}{what}: {} times{period}{changes}", count.number);
         }
@@ -419,13 +426,15 @@ impl Teller for Story<'_> {
                 self.say(time, bus, from, &what);
             }
             Kind::CanLink { channel } => {
-                if self.cycle(Cycle::Identifier(number, frame.id, false), time, frame.data()).0 {
-                    self.say(
-                        time,
-                        bus,
-                        "CAN Link",
-                        &format!("channel {channel} begins: {}", bytes(frame.data())),
-                    );
+                let cycle = Cycle::Channel(number, channel);
+                let (first, changed) = self.cycle(cycle, time, frame.data());
+                let changes = self.cycles.get(&cycle).map_or(0, |count| count.changes);
+                // Enough changes that it is seen how the channel lives.
+                if changed && changes <= u64::from(VALUES) {
+                    let begins = if first { " begins" } else { "" };
+                    let more = if changes == u64::from(VALUES) { " (and so on)" } else { "" };
+                    let what = format!("channel {channel}{begins}: {}{more}", bytes(frame.data()));
+                    self.say(time, bus, "CAN Link", &what);
                 }
             }
             Kind::SdoRequest(_) | Kind::SdoResponse(_) => {}

@@ -171,6 +171,19 @@ fn at_once(mut action: impl FnMut(&mut Plc<'_>) + 'static) -> Block {
     })
 }
 
+/// An action that is repeated as long as it is asked for.
+fn every(period: Duration, mut action: impl FnMut(&mut Plc<'_>) + 'static) -> Block {
+    let mut wait = Duration::ZERO;
+    Box::new(move |plc, asked| {
+        if asked && wait.is_zero() {
+            action(plc);
+            wait = period;
+        }
+        wait = wait.saturating_sub(Duration::from_millis(plc.cycle.into()));
+        Outputs { busy: asked, ..Outputs::default() }
+    })
+}
+
 fn block(step: &Step) -> Result<Block, Exit> {
     let axis = step.axis.unwrap_or(0);
     let at = step.bus.map_or(0, BusName::at);
@@ -223,9 +236,13 @@ fn block(step: &Step) -> Result<Block, Exit> {
         Action::Write => {
             let (object, data) =
                 (usize::from(step.object.unwrap_or(0)), Payload::from_slice(&step.payload()?));
-            at_once(move |plc| {
+            let write = move |plc: &mut Plc<'_>| {
                 plc.can[at].image().write(object, data);
-            })
+            };
+            match step.period()? {
+                Some(period) => every(period, write),
+                None => at_once(write),
+            }
         }
         Action::Send => {
             let (channel, data) = (step.channel()?, step.payload()?);

@@ -68,7 +68,7 @@ pub(super) struct Step {
     pub(super) channel: Option<u8>,
     /// Of write and send: up to 8 bytes in hex.
     pub(super) data: Option<String>,
-    /// Of send: seconds between two frames.
+    /// Of write and send: seconds between two frames.
     pub(super) period: Option<f64>,
     pub(super) position: Option<i32>,
     pub(super) distance: Option<i32>,
@@ -115,6 +115,7 @@ impl Step {
                     return Err(self.wrong(format!("object {object}, 1 to {OBJECTS} expected")));
                 }
                 self.payload()?;
+                self.period()?;
             }
             Action::Send => {
                 self.channel()?;
@@ -151,11 +152,16 @@ impl Step {
         Channel::new(self.need(self.channel, "channel")?).map_err(|error| self.wrong(error))
     }
 
+    /// How often write and send send.
+    pub(super) fn period(&self) -> Result<Option<Duration>, Exit> {
+        let Some(seconds) = self.period else { return Ok(None) };
+        let period = Duration::try_from_secs_f64(seconds).ok().filter(|period| !period.is_zero());
+        period.map(Some).ok_or_else(|| self.wrong(format!("period {seconds}, a time above 0 expected")))
+    }
+
     /// When a channel is sent.
     pub(super) fn trigger(&self) -> Result<Trigger, Exit> {
-        let Some(seconds) = self.period else { return Ok(Trigger::Change) };
-        let period = Duration::try_from_secs_f64(seconds);
-        Ok(Trigger::Period(period.map_err(|error| self.wrong(format!("period {seconds}: {error}")))?))
+        Ok(self.period()?.map_or(Trigger::Change, Trigger::Period))
     }
 
     pub(super) fn begin(&self) -> Duration {

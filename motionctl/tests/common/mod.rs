@@ -111,6 +111,7 @@ impl Ran {
         self
     }
 
+    #[allow(dead_code)] // not in every test program
     #[track_caller]
     pub(crate) fn says(self, words: &str) -> Self {
         let all = self.stdout() + &self.stderr();

@@ -1,0 +1,113 @@
+//! Where the program's input and output go: pipes that nobody reads, and a terminal that is asked on.
+#![cfg(unix)]
+
+mod common;
+
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read};
+use std::process::{Command, Stdio};
+
+use common::Bench;
+use motion_io::port::{Port, Role, open};
+
+/// The end of a terminal that a person has, and that of the program.
+fn terminal(bench: &Bench) -> (Box<dyn Port>, File) {
+    let link = bench.path("TERMINAL");
+    let person = open(&format!("pty:{}", link.display()).parse().unwrap(), Role::Device).unwrap();
+    (person, File::options().read(true).write(true).open(link).unwrap())
+}
+
+fn motionctl(bench: &Bench, arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_motionctl"));
+    command.args(arguments).current_dir(bench.directory.path()).stdin(Stdio::null());
+    command
+}
+
+/// Standard output of which only `lines` lines are read, as by `head`.
+#[track_caller]
+fn head(bench: &Bench, arguments: &[&str], lines: usize) {
+    let mut child =
+        motionctl(bench, arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let mut said = BufReader::with_capacity(16, child.stdout.take().unwrap());
+    for _ in 0..lines {
+        assert_ne!(said.read_line(&mut String::new()).unwrap(), 0, "{arguments:?}");
+    }
+    drop(said);
+    let ended = child.wait().unwrap();
+    let mut error = String::new();
+    child.stderr.take().unwrap().read_to_string(&mut error).unwrap();
+    assert_eq!((ended.code(), error.contains("panicked")), (Some(0), false), "{arguments:?}: {error}");
+}
+
+#[test]
+fn a_reader_that_goes_is_no_trouble() {
+    let bench = Bench::new();
+    for arguments in [
+        &["params", "list"][..],
+        &["params", "list", "--json"],
+        &["completions", "bash"],
+        &["man"],
+        &["ports"],
+        &["--help"],
+    ] {
+        head(&bench, arguments, 0);
+        head(&bench, arguments, 1);
+    }
+    // What runs until it is stopped is stopped by it, as by a signal.
+    std::fs::write(bench.path("run.toml"), "[[program]]\nat = 0.1\ndo = \"power\"\naxis = 1\n").unwrap();
+    head(&bench, &["run", "run.toml", "--json"], 1);
+}
+
+/// Other trouble with standard output is told.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_is_trouble() {
+    let bench = Bench::new();
+    let full = File::options().write(true).open("/dev/full").unwrap();
+    let ended = motionctl(&bench, &["params", "list"]).stdout(full).output().unwrap();
+    let error = String::from_utf8_lossy(&ended.stderr).into_owned();
+    assert_eq!(ended.status.code(), Some(5), "{error}");
+    assert!(error.contains("standard output"), "{error}");
+}
+
+/// What writes flash asks on a terminal, and nowhere else; `--yes` answers.
+#[test]
+fn flash_is_asked_for_on_a_terminal() {
+    let bench = Bench::new();
+    let _controller = bench.controller(&[]);
+    bench.run(&["params", "backup", "--port", "LINE", "F.toml"]).ends(0);
+    bench.run(&["params", "set", "--port", "LINE", "642", "5", "--save"]).ends(0);
+    let asks = |arguments: &[&str], answer: &str| {
+        let (mut person, terminal) = terminal(&bench);
+        let mut child = motionctl(&bench, arguments)
+            .stdin(terminal)
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        person.send(answer.as_bytes()).unwrap();
+        let mut words = String::new();
+        child.stderr.take().unwrap().read_to_string(&mut words).unwrap();
+        (child.wait().unwrap().code(), words)
+    };
+    let value = || {
+        let json = bench.run(&["params", "get", "--port", "LINE", "642", "--json"]).ends(0).json();
+        json["parameters"][0]["value"].as_i64().unwrap()
+    };
+    for arguments in [
+        &["params", "restore", "--port", "LINE", "F.toml"][..],
+        &["params", "reset", "--port", "LINE", "--factory"],
+        &["params", "set", "--port", "LINE", "642", "0", "--save"],
+    ] {
+        bench.run(&["params", "set", "--port", "LINE", "642", "5", "--save"]).ends(0);
+        let (status, words) = asks(arguments, "n\n");
+        assert_eq!((status, value()), (Some(1), 5), "{arguments:?}: {words}");
+        assert!(words.contains("flash?"), "{arguments:?}: {words}");
+        let (status, words) = asks(arguments, "y\n");
+        assert_eq!((status, value()), (Some(0), 0), "{arguments:?}: {words}");
+        bench.run(&["params", "set", "--port", "LINE", "642", "5", "--save"]).ends(0);
+        let (status, words) = asks(&[arguments, &["--yes"]].concat(), "");
+        assert_eq!((status, value()), (Some(0), 0), "{arguments:?}: {words}");
+        assert!(!words.contains("flash?"), "{arguments:?}: {words}");
+    }
+}
