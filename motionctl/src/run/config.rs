@@ -1,5 +1,6 @@
 //! `CONFIG.toml` of `motionctl run`.
 
+use core::time::Duration;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
