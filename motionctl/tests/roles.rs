@@ -21,7 +21,7 @@ const LIMIT: Duration = Duration::from_secs(60);
 struct Stream {
     child: Child,
     said: Receiver<Value>,
-    /// All that was read so far.
+    /// What came and was not waited for yet.
     seen: Vec<Value>,
 }
 
@@ -46,18 +46,19 @@ impl Stream {
         Self { child, said, seen: Vec::new() }
     }
 
-    /// Reads on until an event has these fields.
+    /// Waits for an event with these fields, which may have come already.
     #[track_caller]
-    fn wait(&mut self, fields: &Value) -> &Value {
+    fn wait(&mut self, fields: &Value) -> Value {
+        let fits =
+            |event: &Value| fields.as_object().unwrap().iter().all(|(key, value)| event[key] == *value);
         let end = Instant::now() + LIMIT;
         loop {
-            let Ok(event) = self.said.recv_timeout(end.saturating_duration_since(Instant::now())) else {
-                panic!("{fields} did not come: {:#?}", self.seen);
-            };
-            let found = fields.as_object().unwrap().iter().all(|(key, value)| event[key] == *value);
-            self.seen.push(event);
-            if found {
-                return self.seen.last().unwrap();
+            if let Some(place) = self.seen.iter().position(fits) {
+                return self.seen.remove(place);
+            }
+            match self.said.recv_timeout(end.saturating_duration_since(Instant::now())) {
+                Ok(event) => self.seen.push(event),
+                Err(_) => panic!("{fields} did not come: {:#?}", self.seen),
             }
         }
     }
@@ -73,7 +74,7 @@ impl Drop for Stream {
 /// A bus for several processes, and its endpoint.
 fn bus(bench: &Bench) -> (Stream, String) {
     let mut bus = Stream::start(bench, &["bus", "--listen", "127.0.0.1:0"]);
-    let ready = bus.wait(&json!({ "bitrate": 500_000 })).clone();
+    let ready = bus.wait(&json!({ "bitrate": 500_000 }));
     (bus, format!("socketcand:{}/can0", ready["listen"].as_str().unwrap()))
 }
 
@@ -123,7 +124,7 @@ fn the_master_bypass_example_with_three_programs() {
     first.wait(&object(4, 10, "7A"));
     second.wait(&object(4, 10, "5A"));
     // Which of the slaves is earlier is chance.
-    let mut came: Vec<Value> = (0..2).map(|_| master.wait(&json!({ "event": "object" })).clone()).collect();
+    let mut came: Vec<Value> = (0..2).map(|_| master.wait(&json!({ "event": "object" }))).collect();
     came.sort_by_key(|event| event["node"].as_u64());
     let came: Vec<_> = came.iter().map(|event| (&event["object"], &event["node"], &event["data"])).collect();
     assert_eq!(came, [(&json!("IN 1"), &json!(5), &json!("51")), (&json!("IN 2"), &json!(7), &json!("71"))]);
