@@ -8,7 +8,7 @@
 
 /// As std's, but that nobody reads to the end, as with `| head`, is no trouble.
 macro_rules! println {
-    ($($words:tt)*) => { $crate::output::put(&format!("{}\n", format_args!($($words)*))) };
+    ($($words:tt)*) => { $crate::output::put(format!("{}\n", format_args!($($words)*))) };
 }
 
 /// As std's, but that nobody listens is no trouble.

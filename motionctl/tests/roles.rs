@@ -6,10 +6,11 @@
 
 mod common;
 
+use core::time::Duration;
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use common::Bench;
 use serde_json::{Value, json};

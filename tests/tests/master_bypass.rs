@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use conformance::controllers::{Rig, Station};
 use motion_core::application::Plc;
 use oorandom::Rand32;
-use pdo::{Frame, Payload};
+use pdo::{Frame, NodeId, Payload};
 
 const SEED: u64 = 0x0B;
 
@@ -118,7 +118,7 @@ fn the_manuals_example() {
     // The master scans, boots and starts both slaves.
     let start = rig.run(Duration::from_secs(3));
     let ready = rig.stations[0].controller().bus(0).unwrap().ready();
-    assert_eq!(ready.iter().map(|node| node.raw()).collect::<Vec<_>>(), [5, 7]);
+    assert_eq!(ready.iter().map(NodeId::raw).collect::<Vec<_>>(), [5, 7]);
 
     // Both ways on all three lines, in 200 patterns.
     let mut random = Rand32::new(SEED);

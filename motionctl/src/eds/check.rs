@@ -39,7 +39,7 @@ pub(super) fn run(out: &Output, input: &Input, lenient: bool) -> Result<(), Exit
         let lines: String = diagnostics.iter().map(|diagnostic| line(&name, diagnostic)).collect();
         let kind = kind_word(&reading);
         let encoding = reading.source.encoding.name();
-        put(&format!(
+        put(format!(
             "{lines}{name}: {kind}, {encoding}, {objects} objects, {entries} entries, {errors} errors, {warnings} warnings\n"
         ));
     });
