@@ -90,7 +90,7 @@ impl Client {
         })
     }
 
-    /// Whether an answer to [`Access::flash_state`] says that flash is still being written.
+    /// Whether an answer to [`Access::flash_state`](super::Access::flash_state) says that flash is still being written.
     #[must_use]
     pub const fn is_flash_busy(answer: Answer) -> bool {
         matches!(answer, Answer::Read([state, ..]) if state != 0)

@@ -1,7 +1,7 @@
 //! Curves as CSV: a head line of attributes, then one setpoint a line (project-defined).
 //!
 //! `# name=… length_ms=… unit=0.1um` is all that a file made by hand needs; a cam has `length=…` in
-//! encoder increments in place of `length_ms`. What [`write`] writes has all that the info block has, and
+//! encoder increments in place of `length_ms`. What [`write()`] writes has all that the info block has, and
 //! `setpoints=…`, by which a file that was cut off is known.
 //! A value lies between quotes where it would be taken for something else.
 
