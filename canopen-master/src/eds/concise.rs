@@ -5,10 +5,11 @@
 //! little-endian. The entries are written to the device in this order.
 
 use alloc::collections::BTreeMap;
+use alloc::string::String;
 use alloc::vec::Vec;
 
 use super::model::{Device, Entry};
-use super::value::{ValueError, from_bytes};
+use super::value::{ValueError, from_bytes, to_bytes};
 use crate::data_type::DataType;
 
 /// One value to write.
@@ -169,20 +170,24 @@ impl Device {
     }
 
     /// Takes the values of a concise DCF as `ParameterValue`s. Gives the entries that the device does
-    /// not describe, and leaves these out.
+    /// not describe, and those of which the bytes are no value of the object's data type or a text
+    /// that a line of a file does not hold; leaves these out.
     pub fn apply_concise(&mut self, entries: &[ConciseEntry]) -> Vec<ConciseEntry> {
-        let mut unknown = Vec::new();
+        let mut refused = Vec::new();
         for concise in entries {
             let base = self
                 .entry(concise.index, concise.subindex)
                 .map(|entry| self.base_type(entry.data_type.unwrap_or(DataType::DOMAIN)));
             let place = self.object_mut(concise.index).and_then(|object| object.entry_mut(concise.subindex));
             match (place, base) {
-                (Some(entry), Some(base)) => entry.value = Some(from_bytes(&concise.data, base)),
-                _ => unknown.push(concise.clone()),
+                (Some(entry), Some(base)) => match text_of(&concise.data, base) {
+                    Some(text) => entry.value = Some(text),
+                    None => refused.push(concise.clone()),
+                },
+                _ => refused.push(concise.clone()),
             }
         }
-        unknown
+        refused
     }
 
     /// COB-ID that a PDO shall have in the end, from value or default.
@@ -192,6 +197,13 @@ impl Device {
         let bytes = entry.value_bytes(node_id).or_else(|| entry.default_bytes(node_id))?.ok()?;
         Some(u32::from_le_bytes(bytes.try_into().ok()?))
     }
+}
+
+/// The text of which a file gives exactly these bytes back.
+fn text_of(bytes: &[u8], data_type: DataType) -> Option<String> {
+    let text = from_bytes(bytes, data_type);
+    let holds = !text.is_empty() && text.trim() == text && !text.contains(['\r', '\n']);
+    (holds && to_bytes(&text, data_type, None).as_deref() == Ok(bytes)).then_some(text)
 }
 
 /// Moves the changes of one PDO in the order that its mapping needs.
@@ -277,5 +289,18 @@ mod tests {
         assert_eq!(parse_concise(&[0, 0, 0, 0, 9]), Err(ConciseError::Surplus(1)));
         let unknown = vec![ConciseEntry { index: 0x2000, subindex: 0, data: vec![1] }];
         assert_eq!(read(DCF.as_bytes()).unwrap().device.apply_concise(&unknown), unknown);
+    }
+
+    #[test]
+    fn bytes_of_another_length_are_no_value() {
+        let text = "[2000]\nParameterName=a\nDataType=6\nAccessType=rw\n[2001]\nParameterName=b\nDataType=9\nAccessType=rw\n";
+        let mut device = read(text.as_bytes()).unwrap().device;
+        let entry = |index, data: &[u8]| ConciseEntry { index, subindex: 0, data: data.to_vec() };
+        let refused = vec![entry(0x2000, &[1]), entry(0x2000, &[1, 2, 3]), entry(0x2001, b"two\nlines")];
+        assert_eq!(device.apply_concise(&refused), refused);
+        assert_eq!(device.to_concise(None), Ok(vec![]));
+        let taken = vec![entry(0x2000, &[1, 2]), entry(0x2001, b"one line")];
+        assert_eq!(device.apply_concise(&taken), []);
+        assert_eq!(device.to_concise(None), Ok(taken));
     }
 }

@@ -4,7 +4,7 @@ use super::model::strip_prefix;
 use super::types::List;
 
 /// Sections of an object.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(crate) enum Part {
     /// `[1018]`
     Own,

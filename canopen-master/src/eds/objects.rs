@@ -46,7 +46,9 @@ impl<'a> Builder<'a> {
 
     /// The objects, and entries of lists that belong to no sub-object.
     pub(crate) fn finish(&mut self, findings: &mut Findings) -> (Vec<Object>, Vec<Section>) {
-        let pending = core::mem::take(&mut self.pending);
+        let mut pending = core::mem::take(&mut self.pending);
+        // Sections of the same kind stay in the order of the file.
+        pending.sort_by_key(|(index, part, _)| (*index, *part));
         for (index, part, section) in &pending {
             if let Part::Sub(subindex) = *part {
                 self.add_sub(*index, subindex, section, findings);
@@ -71,7 +73,7 @@ impl<'a> Builder<'a> {
                 Part::Own | Part::Sub(_) => continue,
             };
             if !rest.is_empty() {
-                leftover.push(Section { name: section.name.to_owned(), fields: rest });
+                join(&mut leftover, section.name, rest);
             }
         }
         (core::mem::take(&mut self.objects).into_values().collect(), leftover)
@@ -181,6 +183,14 @@ impl<'a> Builder<'a> {
         let links = indices(section, "ObjectLinks", Rule::Links, findings);
         object.links.extend(links.into_iter().map(|(_, index)| index));
         Fields::default()
+    }
+}
+
+/// Adds a section, or its entries to the one before of the same name.
+fn join(sections: &mut Vec<Section>, name: &str, fields: Fields) {
+    match sections.last_mut().filter(|section| section.name.eq_ignore_ascii_case(name)) {
+        Some(section) => fields.iter().for_each(|(key, value)| _ = section.fields.set(key, value)),
+        None => sections.push(Section { name: name.to_owned(), fields }),
     }
 }
 

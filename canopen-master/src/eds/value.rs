@@ -212,10 +212,13 @@ pub fn from_bytes(bytes: &[u8], data_type: DataType) -> String {
             char::decode_utf16(units).map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER)).collect()
         }
         (DataType::REAL32, Some(bits)) if bytes.len() == 4 => {
-            alloc::format!("{}", f32::from_bits(bits as u32))
+            let value = f32::from_bits(bits as u32);
+            // Only its bits say which NaN it is.
+            if value.is_nan() { alloc::format!("0x{bits:08X}") } else { alloc::format!("{value}") }
         }
         (DataType::REAL64, Some(bits)) if bytes.len() == 8 => {
-            alloc::format!("{}", f64::from_bits(bits as u64))
+            let value = f64::from_bits(bits as u64);
+            if value.is_nan() { alloc::format!("0x{bits:016X}") } else { alloc::format!("{value}") }
         }
         (_, Some(number)) if integer_bits(data_type).is_some() => match fit(number, data_type) {
             Some(value) if matches!(data_type.kind(), Kind::Signed(_)) => alloc::format!("{value}"),
@@ -289,10 +292,13 @@ mod tests {
 
     #[test]
     fn text_of_bytes_gives_the_bytes_back() {
-        let cases: [(&[u8], DataType); 7] = [
+        let cases: [(&[u8], DataType); 10] = [
             (&[0xFE, 0xFF], DataType::INTEGER16),
             (&[0x80, 0x01, 0, 0xC0], DataType::UNSIGNED32),
             (&[0, 0, 0xC0, 0x3F], DataType::REAL32),
+            (&[1, 0, 0xC0, 0xFF], DataType::REAL32),
+            (&[0xCD, 0xCC, 0xCC, 0x3D], DataType::REAL32),
+            (&[1, 0, 0, 0, 0, 0, 0xF0, 0x7F], DataType::REAL64),
             (b"text", DataType::VISIBLE_STRING),
             (&[0x41, 0, 0xAC, 0x20], DataType::UNICODE_STRING),
             (&[1, 2, 3], DataType::DOMAIN),

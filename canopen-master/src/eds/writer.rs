@@ -430,4 +430,24 @@ mod tests {
         assert!(text.contains("[1A00Value]\r\nNrOfEntries=1\r\n2=0x60410010\r\n"), "{text}");
         assert!(!text.contains("1A00sub"), "{text}");
     }
+
+    /// Found by fuzzing: of two such lists the second one got lost, and their order changed.
+    #[test]
+    fn lists_that_belong_to_no_object_are_all_kept() {
+        let text = "[1000]\nParameterName=a\nCompactSubObj=1\n[1003Value]\n1=x\n[1003Name]\n1=a\n2=b\n\
+            [1000Denotation]\n9=d\n[1003name]\n1=c\n[1000Name]\n9=n\n";
+        let device = read(text.as_bytes()).unwrap().device;
+        let others: Vec<String> =
+            device.other.iter().map(|section| format!("{} {:?}", section.name, section.fields)).collect();
+        assert_eq!(
+            others,
+            [
+                r#"1000Name Fields([("9", "n")])"#,
+                r#"1000Denotation Fields([("9", "d")])"#,
+                r#"1003Name Fields([("1", "c"), ("2", "b")])"#,
+                r#"1003Value Fields([("1", "x")])"#,
+            ]
+        );
+        assert_eq!(read(write_eds(&device).as_bytes()).unwrap().device, device);
+    }
 }

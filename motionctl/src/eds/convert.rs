@@ -75,7 +75,11 @@ fn configure(out: &Output, device: &mut Device, changes: &Changes<'_>) -> Result
         let name = path.display().to_string();
         let entries = eds::parse_concise(&bytes(path)?).map_err(|error| Exit::file(&name, &error))?;
         for entry in device.apply_concise(&entries) {
-            out.remark(format!("{name}: {:04X}h:{:02X} is not in the file", entry.index, entry.subindex));
+            let why = match device.entry(entry.index, entry.subindex) {
+                None => "is not in the file".to_owned(),
+                Some(_) => format!("{} bytes are no value of its data type", entry.data.len()),
+            };
+            out.remark(format!("{name}: {:04X}h:{:02X} left out: {why}", entry.index, entry.subindex));
         }
     }
     for text in changes.values {

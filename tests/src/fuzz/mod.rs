@@ -4,6 +4,7 @@
 mod canopen;
 mod captures;
 mod device;
+mod device_files;
 mod frames;
 mod linmot;
 mod linmot_ops;
@@ -13,6 +14,7 @@ mod trace;
 pub use canopen::{od_ops, sdo_client_ops, sdo_server_ops};
 pub use captures::{capture_asc, capture_candump, capture_columns, capture_lb2, capture_pcap, capture_trc};
 pub use device::device_ops;
+pub use device_files::{eds_concise, eds_read, xdd_read};
 pub use frames::{decode, request, response};
 pub use linmot::{linmot_curve, linmot_curve_file, linmot_linrs, linmot_pvl, linmot_table, linmot_telegrams};
 pub use linmot_ops::{linmot_client_ops, linmot_drive_ops};
@@ -23,7 +25,7 @@ pub use trace::trace;
 pub type Target = fn(&[u8]);
 
 /// Every target by its name under `fuzz/fuzz_targets` and `fuzz/corpus`.
-pub const TARGETS: [(&str, Target); 23] = [
+pub const TARGETS: [(&str, Target); 26] = [
     ("lb2_decode", decode),
     ("lb2_request", request),
     ("lb2_response", response),
@@ -39,6 +41,9 @@ pub const TARGETS: [(&str, Target); 23] = [
     ("capture_pcap", capture_pcap),
     ("capture_lb2", capture_lb2),
     ("trace", trace),
+    ("eds_read", eds_read),
+    ("xdd_read", xdd_read),
+    ("eds_concise", eds_concise),
     ("linmot_pvl", linmot_pvl),
     ("linmot_curve", linmot_curve),
     ("linmot_curve_file", linmot_curve_file),
