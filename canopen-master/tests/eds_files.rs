@@ -3,7 +3,15 @@
 
 use std::path::{Path, PathBuf};
 
-use canopen_master::eds;
+use canopen_master::eds::{self, Format};
+
+/// The files that are no device description, and what is said of them.
+const REFUSED: [(&str, &str); 4] = [
+    ("jiujiujiur0000__CANopenEditor__NewCANopenProject.cpj", "a project file that holds no device"),
+    ("lbgitlove__CANopenEditorLB__demo_device.xdd", "root element is DeviceProfile"),
+    ("lbgitlove__CANopenEditorLB__incomplete_device.xdd", "root element is DeviceProfile"),
+    ("lbgitlove__CANopenEditorLB__mixed_case_device.xdd", "root element is DeviceProfile"),
+];
 
 fn files() -> Option<Vec<PathBuf>> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/recorded/eds");
@@ -17,27 +25,39 @@ fn files() -> Option<Vec<PathBuf>> {
 }
 
 #[test]
-fn every_file_reads_or_is_refused_with_a_reason() {
+fn every_file_survives_being_written_or_is_refused_with_a_reason() {
     let Some(files) = files() else { return };
+    assert!(files.len() >= 218, "{} files", files.len());
+    let mut refused = Vec::new();
     for file in &files {
         let name = file.file_name().unwrap().to_string_lossy();
-        match eds::read(&std::fs::read(file).unwrap()) {
-            Ok(reading) => {
-                let device = &reading.device;
-                let subs: usize = device.objects.iter().map(|object| object.entries().len()).sum();
-                println!(
-                    "{name}: {} objects, {subs} entries, {} findings",
-                    device.objects.len(),
-                    reading.diagnostics.len()
-                );
-                for d in reading.diagnostics.iter().take(6) {
-                    println!("    {d}");
-                }
-            }
+        let bytes = std::fs::read(file).unwrap();
+        let reading = match eds::read(&bytes) {
+            Ok(reading) => reading,
             Err(error) => {
                 println!("{name}: refused: {error}");
-                assert!(!name.ends_with(".eds") && !name.ends_with(".dcf"), "{name}");
+                refused.push((name.into_owned(), error.to_string()));
+                continue;
             }
-        }
+        };
+        let device = &reading.device;
+        let text = match reading.source.format {
+            Format::Eds => eds::write_eds(device),
+            Format::Xdd => eds::write_xdd(device).0,
+        };
+        assert_eq!(&eds::read(text.as_bytes()).unwrap().device, device, "{name}, written anew");
+        assert_eq!(reading.source.encode(&reading.update(device)), bytes, "{name}, unchanged");
+        let subs: usize = device.objects.iter().map(|object| object.entries().len()).sum();
+        println!(
+            "{name}: {} objects, {subs} entries, {} doubtful places, {} findings in all; written and read again: same",
+            device.objects.len(),
+            reading.diagnostics.len(),
+            eds::check(&reading).len(),
+        );
+    }
+    assert_eq!(refused.len(), REFUSED.len(), "{refused:#?}");
+    for ((name, error), (expected, words)) in refused.iter().zip(REFUSED) {
+        assert_eq!(name, expected);
+        assert!(error.contains(words), "{name}: {error}");
     }
 }

@@ -97,6 +97,10 @@ impl Source {
     }
 }
 
+/// The longest file that is read, in bytes: forty times the longest one known, and short enough that a file
+/// made to fill the memory does not.
+pub const MOST_BYTES: usize = 16 << 20;
+
 /// Why a file is refused.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -104,6 +108,14 @@ pub enum ReadError {
     /// Nothing in it.
     #[error("the file is empty")]
     Empty,
+    /// Far longer than any device description.
+    #[error("longer than {MOST_BYTES} bytes, which no device description is")]
+    TooLong,
+    /// UTF-16, which neither EDS nor XDD is written in.
+    #[error(
+        "UTF-16 (it begins with {0:02X} {1:02X}); a device description is ASCII or UTF-8: save it as one of these"
+    )]
+    Utf16(u8, u8),
     /// Bytes that no text has.
     #[error("not a text file: zero byte at offset {0}")]
     Binary(usize),
@@ -158,6 +170,12 @@ pub fn read(bytes: &[u8]) -> Result<Reading, ReadError> {
 /// # Errors
 /// [`ReadError`] where the file is no device description at all.
 pub fn read_as(bytes: &[u8], encoding: Encoding) -> Result<Reading, ReadError> {
+    if bytes.len() > MOST_BYTES {
+        return Err(ReadError::TooLong);
+    }
+    if let [a @ 0xFF, b @ 0xFE, ..] | [a @ 0xFE, b @ 0xFF, ..] = *bytes {
+        return Err(ReadError::Utf16(a, b));
+    }
     let text = encoding.decode(bytes);
     if text.trim().is_empty() {
         return Err(ReadError::Empty);

@@ -1,22 +1,51 @@
 //! What a device description says, whatever the format it is written in.
 
 use alloc::borrow::ToOwned;
+use alloc::collections::BTreeMap;
 use alloc::string::String;
 use alloc::vec::Vec;
+use core::fmt;
 
 use super::types::{Access, List, ObjectType, PdoMapping, length_in_bits};
 use super::value::{Number, ValueError, to_bytes};
 use crate::data_type::DataType;
 
 /// Keys and values in their order; keys compare without regard to case.
-#[derive(Clone, PartialEq, Eq, Debug, Default)]
-pub struct Fields(Vec<(String, String)>);
+#[derive(Clone, Default)]
+pub struct Fields {
+    pairs: Vec<(String, String)>,
+    /// Where each key stands first, in lower case; only of many keys, which would be slow to look
+    /// through.
+    places: BTreeMap<String, usize>,
+}
+
+/// Keys that are looked through one by one.
+const FEW: usize = 64;
 
 impl Fields {
+    fn place(&self, key: &str) -> Option<usize> {
+        if self.places.is_empty() {
+            return self.pairs.iter().position(|(have, _)| have.eq_ignore_ascii_case(key));
+        }
+        self.places.get(&key.to_ascii_lowercase()).copied()
+    }
+
+    fn push(&mut self, key: String, value: String) {
+        self.pairs.push((key, value));
+        let new = match self.pairs.len() {
+            ..=FEW => return,
+            len if self.places.is_empty() => 0..len,
+            len => len - 1..len,
+        };
+        for (at, (key, _)) in self.pairs.iter().enumerate().take(new.end).skip(new.start) {
+            self.places.entry(key.to_ascii_lowercase()).or_insert(at);
+        }
+    }
+
     /// The value of a key.
     #[must_use]
     pub fn get(&self, key: &str) -> Option<&str> {
-        self.0.iter().find(|(have, _)| have.eq_ignore_ascii_case(key)).map(|(_, value)| value.as_str())
+        self.pairs.get(self.place(key)?).map(|(_, value)| value.as_str())
     }
 
     /// The value of a key as a number.
@@ -39,13 +68,13 @@ impl Fields {
 
     /// Sets a key: in its place, or as the last one. Returns whether it was there.
     pub fn set(&mut self, key: &str, value: impl Into<String>) -> bool {
-        match self.0.iter_mut().find(|(have, _)| have.eq_ignore_ascii_case(key)) {
+        match self.place(key).and_then(|at| self.pairs.get_mut(at)) {
             Some((_, old)) => {
                 *old = value.into();
                 true
             }
             None => {
-                self.0.push((key.to_owned(), value.into()));
+                self.push(key.to_owned(), value.into());
                 false
             }
         }
@@ -53,19 +82,35 @@ impl Fields {
 
     /// Keys and values in their order.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = (&str, &str)> {
-        self.0.iter().map(|(key, value)| (key.as_str(), value.as_str()))
+        self.pairs.iter().map(|(key, value)| (key.as_str(), value.as_str()))
     }
 
     /// Whether there is none.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.0.is_empty()
+        self.pairs.is_empty()
+    }
+}
+
+impl PartialEq for Fields {
+    fn eq(&self, other: &Self) -> bool {
+        self.pairs == other.pairs
+    }
+}
+
+impl Eq for Fields {}
+
+impl fmt::Debug for Fields {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_map().entries(self.iter()).finish()
     }
 }
 
 impl<K: Into<String>, V: Into<String>> FromIterator<(K, V)> for Fields {
     fn from_iter<I: IntoIterator<Item = (K, V)>>(pairs: I) -> Self {
-        Self(pairs.into_iter().map(|(key, value)| (key.into(), value.into())).collect())
+        let mut fields = Self::default();
+        pairs.into_iter().for_each(|(key, value)| fields.push(key.into(), value.into()));
+        fields
     }
 }
 
@@ -134,6 +179,13 @@ impl Entry {
             flags: None,
             other: Fields::default(),
         }
+    }
+
+    /// Bytes of its texts.
+    pub(crate) fn text_length(&self) -> usize {
+        let texts =
+            [&self.default, &self.low_limit, &self.high_limit, &self.value, &self.ref_name, &self.denotation];
+        texts.into_iter().flatten().map(String::len).sum::<usize>() + self.name.len()
     }
 
     /// Whether the value can be mapped into a PDO.

@@ -15,6 +15,9 @@ use super::types::{Access, ObjectType, PdoMapping};
 use super::value::Number;
 use crate::data_type::DataType;
 
+/// Bytes of text that compact storage repeats in one file, at most: every sub-object has the object's own.
+const COMPACT_TEXT: usize = 64 << 20;
+
 /// Collects the sections of objects, which come in any order.
 #[derive(Default)]
 pub(crate) struct Builder<'a> {
@@ -55,8 +58,20 @@ impl<'a> Builder<'a> {
             }
         }
         self.check_counts(findings);
+        let mut room = COMPACT_TEXT;
         for object in self.objects.values_mut() {
             let Some(count) = object.compact.filter(|count| *count > 0) else { continue };
+            let needed = usize::from(count) * object.own.text_length();
+            if needed > room {
+                let line = self.declared.get(&object.index).map_or(0, |(line, _)| *line);
+                let message = format!(
+                    "CompactSubObj={count} would repeat {} bytes; passed over",
+                    object.own.text_length()
+                );
+                findings.add(line, Rule::Compact, message);
+                continue;
+            }
+            room -= needed;
             for subindex in 0..=count {
                 if object.subs.binary_search_by_key(&subindex, |entry| entry.subindex).is_err() {
                     object.insert(object.compact_entry(subindex));

@@ -1,7 +1,7 @@
 //! EDS and DCF text to [`Device`].
 
 use alloc::borrow::ToOwned;
-use alloc::collections::BTreeMap;
+use alloc::collections::{BTreeMap, BTreeSet};
 use alloc::format;
 use alloc::string::String;
 use alloc::vec::Vec;
@@ -18,9 +18,19 @@ use super::value::Number;
 #[derive(Debug, Default)]
 pub(crate) struct Findings(pub(crate) Vec<Diagnostic>);
 
+/// What nobody reads to the end; a file of nothing but damage would fill the memory.
+const MOST_FINDINGS: usize = 100_000;
+
 impl Findings {
     pub(crate) fn add(&mut self, line: u32, rule: Rule, message: impl Into<String>) {
-        self.0.push(Diagnostic { line, rule, message: message.into() });
+        match self.0.len() {
+            ..MOST_FINDINGS => self.0.push(Diagnostic { line, rule, message: message.into() }),
+            MOST_FINDINGS => {
+                let message = format!("more than {MOST_FINDINGS} findings; no more are listed");
+                self.0.push(Diagnostic { line, rule: Rule::Line, message });
+            }
+            _ => {}
+        }
     }
 }
 
@@ -30,6 +40,7 @@ pub(crate) fn read(document: &Document<'_>, findings: &mut Findings) -> Device {
     let mut main = Builder::default();
     let mut lists = Lists::default();
     let mut modules: BTreeMap<u16, ModuleBuilder<'_>> = BTreeMap::new();
+    let mut others = Others::default();
     let (mut file_info, mut device_info) = (0, 0);
     for section in &document.sections {
         odd_lines(section, findings);
@@ -57,7 +68,7 @@ pub(crate) fn read(document: &Document<'_>, findings: &mut Findings) -> Device {
             Name::Comments => comments(section, &mut device.comments, findings),
             Name::List(list) => lists.add(list, section, findings),
             Name::Module(number, part) => modules.entry(number).or_default().add(part, section, findings),
-            Name::Other => other(section, &mut device.other, findings),
+            Name::Other => others.add(section, findings),
         }
     }
     for (name, line) in [("FileInfo", file_info), ("DeviceInfo", device_info)] {
@@ -67,6 +78,7 @@ pub(crate) fn read(document: &Document<'_>, findings: &mut Findings) -> Device {
     }
     let (objects, leftover) = main.finish(findings);
     device.objects = objects;
+    device.other = others.sections;
     device.other.extend(leftover);
     lists.apply(&mut device, &main, findings);
     for (number, module) in modules {
@@ -138,16 +150,25 @@ pub(crate) fn duplicate(line: u32, key: &str, findings: &mut Findings) {
     findings.add(line, Rule::DuplicateKey, format!("{} is there already; this one counts", shorten(key)));
 }
 
-fn other(section: &Lines<'_>, into: &mut Vec<Section>, findings: &mut Findings) {
-    let at = into.iter().position(|have| have.name.eq_ignore_ascii_case(section.name));
-    if at.is_some() {
-        repeated(section, 0, findings);
-    } else {
-        into.push(Section { name: section.name.to_owned(), fields: Fields::default() });
-    }
-    let at = at.unwrap_or(into.len().saturating_sub(1));
-    if let Some(place) = into.get_mut(at) {
-        fields(section, &mut place.fields, findings);
+/// Sections that have no meaning here, in the order of the file.
+#[derive(Default)]
+struct Others {
+    sections: Vec<Section>,
+    /// By name in lower case.
+    places: BTreeMap<String, usize>,
+}
+
+impl Others {
+    fn add(&mut self, section: &Lines<'_>, findings: &mut Findings) {
+        let at = *self.places.entry(section.name.to_ascii_lowercase()).or_insert(self.sections.len());
+        if at == self.sections.len() {
+            self.sections.push(Section { name: section.name.to_owned(), fields: Fields::default() });
+        } else {
+            repeated(section, 0, findings);
+        }
+        if let Some(place) = self.sections.get_mut(at) {
+            fields(section, &mut place.fields, findings);
+        }
     }
 }
 
@@ -300,14 +321,13 @@ impl<'a> ModuleBuilder<'a> {
             (&self.lists[1], &self.extends, &extends, "SubExt"),
         ] {
             for &(line, index) in list {
-                if !objects.iter().any(|object| object.index == index) {
+                if objects.binary_search_by_key(&index, |object| object.index).is_err() {
                     let message = format!("there is no section [M{number}{kind}{index:04X}]");
                     findings.add(line, Rule::Modules, message);
                 }
             }
-            for object in
-                objects.iter().filter(|object| !list.iter().any(|(_, index)| *index == object.index))
-            {
+            let listed: BTreeSet<u16> = list.iter().map(|(_, index)| *index).collect();
+            for object in objects.iter().filter(|object| !listed.contains(&object.index)) {
                 let message = format!("[M{number}{kind}{:04X}] is in no list", object.index);
                 findings.add(builder.line(object.index), Rule::Modules, message);
             }

@@ -442,10 +442,10 @@ mod tests {
         assert_eq!(
             others,
             [
-                r#"1000Name Fields([("9", "n")])"#,
-                r#"1000Denotation Fields([("9", "d")])"#,
-                r#"1003Name Fields([("1", "c"), ("2", "b")])"#,
-                r#"1003Value Fields([("1", "x")])"#,
+                r#"1000Name {"9": "n"}"#,
+                r#"1000Denotation {"9": "d"}"#,
+                r#"1003Name {"1": "c", "2": "b"}"#,
+                r#"1003Value {"1": "x"}"#,
             ]
         );
         assert_eq!(read(write_eds(&device).as_bytes()).unwrap().device, device);

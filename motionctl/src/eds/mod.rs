@@ -35,15 +35,21 @@ pub(crate) fn run(out: &Output, dry_run: bool, command: &Eds) -> Result<(), Exit
     }
 }
 
-/// The bytes of a file, or of standard input for `-`.
+/// The bytes of a file, or of standard input for `-`; not more than a device description has.
 fn bytes(path: &std::path::Path) -> Result<Vec<u8>, Exit> {
+    let name = path.display().to_string();
+    let most = eds::MOST_BYTES as u64 + 1;
     let mut bytes = Vec::new();
     let read = if path.as_os_str() == "-" {
-        std::io::stdin().read_to_end(&mut bytes).map(|_| bytes)
+        std::io::stdin().take(most).read_to_end(&mut bytes)
     } else {
-        std::fs::read(path)
+        std::fs::File::open(path).and_then(|file| file.take(most).read_to_end(&mut bytes))
     };
-    read.map_err(|error| Exit::file(&path.display().to_string(), &error))
+    read.map_err(|error| Exit::file(&name, &error))?;
+    if bytes.len() > eds::MOST_BYTES {
+        return Err(Exit::file(&name, &eds::ReadError::TooLong));
+    }
+    Ok(bytes)
 }
 
 fn read_bytes(input: &Input, bytes: &[u8]) -> Result<Reading, eds::ReadError> {

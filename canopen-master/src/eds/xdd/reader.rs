@@ -5,6 +5,7 @@ use alloc::collections::BTreeMap;
 use alloc::format;
 use alloc::string::{String, ToString};
 use alloc::vec::Vec;
+use core::cell::Cell;
 
 use roxmltree::{Document, Node};
 
@@ -73,7 +74,13 @@ impl LineIndex {
 struct Context<'a, 'i> {
     lines: LineIndex,
     parameters: BTreeMap<&'a str, Node<'a, 'i>>,
+    /// Bytes of parameters that may still be taken: a few parameters that everything refers to could
+    /// otherwise be made into any amount of text.
+    room: Cell<usize>,
 }
+
+/// How often the text of parameters may be repeated, in lengths of the file.
+const REPEATS: usize = 16;
 
 pub(crate) fn read(text: &str, findings: &mut Findings) -> Result<Device, ReadError> {
     let document = Document::parse(text).map_err(|error| {
@@ -85,6 +92,7 @@ pub(crate) fn read(text: &str, findings: &mut Findings) -> Result<Device, ReadEr
     let context = Context {
         lines: LineIndex::new(text),
         parameters: parameters.filter_map(|node| Some((attribute(node, "uniqueID")?, node))).collect(),
+        room: Cell::new(text.len().saturating_mul(REPEATS)),
     };
     let mut device = Device::default();
     header(container, &mut device, &context, findings);
@@ -320,7 +328,17 @@ fn entry(
     }
     if let Some(id) = attribute(node, "uniqueIDRef") {
         match context.parameters.get(id) {
-            Some(parameter) => complete(&mut entry, *parameter, composed, findings, context),
+            Some(parameter) => match context.room.get().checked_sub(parameter.range().len()) {
+                Some(rest) => {
+                    context.room.set(rest);
+                    complete(&mut entry, *parameter, composed, findings, context);
+                }
+                None => {
+                    let message =
+                        format!("parameter \"{}\" is referred to too often; passed over", shorten(id));
+                    findings.add(line, Rule::Xdd, message);
+                }
+            },
             None => findings.add(line, Rule::Xdd, format!("there is no parameter \"{}\"", shorten(id))),
         }
     }
