@@ -223,7 +223,7 @@ fn put_lss(out: &mut Vec<u8>, message: Lss) {
     }
 }
 
-pub(in super::super) const fn lss_request(request: &lss::Request) -> &'static str {
+const fn lss_request(request: &lss::Request) -> &'static str {
     match request {
         lss::Request::SwitchGlobal(_) => "switch-global",
         lss::Request::Select(..) => "select",
@@ -238,7 +238,7 @@ pub(in super::super) const fn lss_request(request: &lss::Request) -> &'static st
     }
 }
 
-pub(in super::super) const fn lss_response(response: &lss::Response) -> &'static str {
+const fn lss_response(response: &lss::Response) -> &'static str {
     match response {
         lss::Response::Selected => "selected",
         lss::Response::Done { .. } => "done",

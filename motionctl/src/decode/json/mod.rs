@@ -15,8 +15,6 @@ use super::{Teller, Totals, number_of};
 use fields::{put_mapped, put_tail};
 use text::{Piece, key, put_hex, put_number, put_text, put_time, put_word};
 
-pub(super) use fields::{lss_request, lss_response};
-
 /// Writes JSON without blanks.
 pub(super) struct Json<'a> {
     out: Vec<u8>,
