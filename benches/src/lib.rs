@@ -77,7 +77,9 @@ pub fn paired(contenders: &mut [Contender<'_>], rounds: usize) -> Times {
     Times { by_contender }
 }
 
-fn median(values: impl Iterator<Item = f64>) -> f64 {
+/// The middle one of the values.
+#[must_use]
+pub fn median(values: impl Iterator<Item = f64>) -> f64 {
     let mut values: Vec<f64> = values.collect();
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied().unwrap_or(f64::NAN)

@@ -45,6 +45,9 @@ pub enum CaptureError {
     /// The file or stream itself failed.
     #[error(transparent)]
     Io(#[from] io::Error),
+    /// Text of a kind that no format here has.
+    #[error("UTF-16 text; captures are ASCII or UTF-8: save it as one of these")]
+    Utf16,
     /// No format that is known here; the start of the content is quoted.
     #[error("no known capture format; it begins with {0:?}")]
     Unrecognised(String),

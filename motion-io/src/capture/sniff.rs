@@ -11,6 +11,9 @@ pub(super) const LOOK_AHEAD: usize = 64 * 1024;
 /// How many lines.
 const LINES: usize = 400;
 
+/// How every LB2 telegram begins.
+const LB2_HEADER: [u8; 2] = [0x82, 0x96];
+
 /// A capture format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
@@ -56,7 +59,11 @@ pub(super) fn recognise(start: &[u8]) -> Result<Format, CaptureError> {
     if text.iter().all(u8::is_ascii_whitespace) {
         return Ok(Format::Candump);
     }
-    if !is_text(text) {
+    if let [0xFF, 0xFE, _, 0, ..] | [0xFE, 0xFF, 0, ..] = *start {
+        return Err(CaptureError::Utf16);
+    }
+    let is_text = is_text(text);
+    if !is_text && text.windows(2).any(|pair| pair == LB2_HEADER) {
         return Ok(Format::Lb2Raw);
     }
     let lines = || text.split(|&byte| byte == b'\n').map(<[u8]>::trim_ascii).take(LINES);
@@ -81,6 +88,9 @@ pub(super) fn recognise(start: &[u8]) -> Result<Format, CaptureError> {
         if frames > best.0 {
             best = (frames, format);
         }
+    }
+    if !is_text && best.0 == 0 {
+        return Ok(Format::Lb2Raw);
     }
     let hex = lines().filter(|line| hex_line(line).is_some_and(|line| !line.bytes.is_empty())).count();
     if hex > best.0 {
@@ -120,10 +130,16 @@ mod tests {
             (b"82 96 02 40 42\n", Format::Lb2Hex),
             (b"0.125 8296024042\n", Format::Lb2Hex),
             (b"\x82\x96\x02\x40\x42", Format::Lb2Raw),
+            (b"\x00\x01\x02", Format::Lb2Raw),
+            // A log whose end was not yet on the disk when the power went.
+            (b"(1.0) can0 123#11\n\0\0\0\0\0\0", Format::Candump),
             (b"\xD4\xC3\xB2\xA1", Format::Pcap),
             (b"", Format::Candump),
         ] {
             assert_eq!(recognise(content).unwrap(), format, "{}", String::from_utf8_lossy(content));
+        }
+        for utf16 in [b"\xFF\xFE(\x001\0", b"\xFE\xFF\0(\x001"] {
+            assert!(matches!(recognise(utf16), Err(CaptureError::Utf16)));
         }
         let error = recognise(b"\nDear reader,\n").unwrap_err();
         assert_eq!(error.to_string(), "no known capture format; it begins with \"Dear reader,\"");
