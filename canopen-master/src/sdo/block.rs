@@ -45,6 +45,8 @@ pub(super) struct Sender {
     /// Bytes of the last segment of all; known once it was sent.
     last: Option<u8>,
     stalls: u8,
+    /// Segments were sent again.
+    pub(super) repeated: bool,
     /// Over the first `checked` bytes: those sent again are not counted twice.
     crc: Crc,
     checked: u32,
@@ -66,7 +68,7 @@ pub(super) enum Confirmed {
 impl Sender {
     /// Of no transfer.
     pub(super) const EMPTY: Self =
-        Self { block_size: 0, sent: 0, last: None, stalls: 0, crc: Crc(0), checked: 0 };
+        Self { block_size: 0, sent: 0, last: None, stalls: 0, repeated: false, crc: Crc(0), checked: 0 };
 
     pub(super) const fn new(block_size: u8) -> Self {
         Self { block_size, ..Self::EMPTY }
@@ -117,6 +119,7 @@ impl Sender {
         if self.stalls >= STALLS {
             return Confirmed::Stalled;
         }
+        self.repeated |= sequence < self.sent;
         (self.sent, self.last, self.block_size) = (0, None, block_size);
         Confirmed::Bytes(bytes)
     }
@@ -133,6 +136,8 @@ pub(super) struct Receiver {
     /// The last segment of all was received.
     pub(super) ended: bool,
     stalls: u8,
+    /// A segment came out of order, or twice.
+    pub(super) disordered: bool,
     /// Over what was taken, but for the last segment.
     pub(super) crc: Crc,
     pub(super) check: bool,
@@ -140,8 +145,16 @@ pub(super) struct Receiver {
 
 impl Receiver {
     /// Of no transfer.
-    pub(super) const EMPTY: Self =
-        Self { block_size: 0, sequence: 0, heard: false, ended: false, stalls: 0, crc: Crc(0), check: false };
+    pub(super) const EMPTY: Self = Self {
+        block_size: 0,
+        sequence: 0,
+        heard: false,
+        ended: false,
+        stalls: 0,
+        disordered: false,
+        crc: Crc(0),
+        check: false,
+    };
 
     pub(super) const fn new(block_size: u8, check: bool) -> Self {
         Self { block_size, check, ..Self::EMPTY }
@@ -159,6 +172,8 @@ impl Receiver {
         if next {
             self.sequence = sequence;
             self.ended = last;
+        } else {
+            self.disordered = true;
         }
         // An older segment once more ends nothing.
         let over = sequence > self.sequence || next;

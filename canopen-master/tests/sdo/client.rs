@@ -249,3 +249,25 @@ fn frames_of_others_are_ignored() {
     }
     assert_eq!(script.client.strays(), 0);
 }
+
+/// A block segment that comes late looks like a segment of an upload: no transfer begins until it has come.
+#[test]
+fn late_segments_do_not_enter_the_next_transfer() {
+    let mut script = Script::new();
+    script.client.upload(STATUS, Small::EMPTY, &OPTIONS).unwrap();
+    script.sends(0, [0x40, 0x41, 0x60, 0, 0, 0, 0, 0]);
+    script.gets(1, [0x41, 0x41, 0x60, 0, 7, 0, 0, 0]);
+    script.sends(1, [0x60, 0, 0, 0, 0, 0, 0, 0]);
+    script.client.handle_timeout(ms(51));
+    assert_eq!(script.ends().outcome, Outcome::TimedOut);
+    script.client.upload(STATUS, Small::EMPTY, &OPTIONS).unwrap();
+    script.sends(52, [0x80, 0x41, 0x60, 0, 0, 0, 4, 5]);
+    script.sends_nothing(52);
+    assert_eq!(script.client.poll_timeout(), Some(ms(102)));
+    script.gets(60, [0x01, 1, 2, 3, 4, 5, 6, 7]);
+    script.sends_nothing(101);
+    script.client.handle_timeout(ms(102));
+    script.sends(102, [0x40, 0x41, 0x60, 0, 0, 0, 0, 0]);
+    script.gets(103, [0x4B, 0x41, 0x60, 0, 9, 0, 0, 0]);
+    assert_eq!(script.ends().outcome, Outcome::Done(2));
+}

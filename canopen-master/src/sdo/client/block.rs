@@ -127,6 +127,7 @@ impl<B: Buffer> Client<B> {
         }
         self.finish_upload();
         if matches!(self.state, State::Done) {
+            self.unsettled = self.receiver.disordered;
             self.parting = Some(Request::EndBlockUpload.encode());
         }
     }

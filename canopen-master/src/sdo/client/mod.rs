@@ -94,7 +94,8 @@ enum State {
 #[derive(Debug, Clone, Copy)]
 struct Outstanding {
     upload: bool,
-    at: Address,
+    /// `None`: segments, which any transfer could take for its own.
+    at: Option<Address>,
     until: Duration,
 }
 
@@ -113,7 +114,9 @@ struct Outstanding {
 /// service) is counted and otherwise ignored, so no answer of an earlier transfer enters the next one.
 /// An answer carries nothing to tell two like requests apart; therefore after a time-out or a cancel
 /// before the first answer, the *same* request to the *same* object is held back until the old answer
-/// has come, or for one more time-out.
+/// has come, or for one more time-out. Segments do not even name their object: after a transfer that
+/// failed among them, and after a block transfer in which some were repeated, the next transfer begins one
+/// time-out later than it could.
 #[derive(Debug, Clone)]
 pub struct Client<B> {
     channel: Channel,
@@ -138,6 +141,8 @@ pub struct Client<B> {
     /// Block upload: the last segment, of which maybe not all bytes count.
     held: Option<[u8; SEGMENT]>,
     outstanding: Option<Outstanding>,
+    /// Segments of the last transfer may still be on their way.
+    unsettled: bool,
     ticket: u32,
     strays: u32,
 }
@@ -163,6 +168,7 @@ impl<B: Buffer> Client<B> {
             check: false,
             held: None,
             outstanding: None,
+            unsettled: false,
             ticket: 0,
             strays: 0,
         }
@@ -332,12 +338,21 @@ impl<B: Buffer> Client<B> {
             }
             return None;
         };
+        if self.unsettled {
+            self.settle(now);
+        }
         if self.held_back_until().is_some_and(|until| now < until) {
             return None;
         }
         self.tx = None;
         self.deadline = Some(after(now, self.timeout));
         Some(Frame::standard(self.channel.request, tx))
+    }
+
+    #[cold]
+    fn settle(&mut self, now: Duration) {
+        self.unsettled = false;
+        self.outstanding = Some(Outstanding { upload: false, at: None, until: after(now, self.timeout) });
     }
 
     fn parting_frame(&mut self) -> Option<Frame> {
@@ -411,7 +426,10 @@ impl<B: Buffer> Client<B> {
             (Response::AckBlockDownload { sequence, block_size }, State::BlockSend | State::BlockConfirm) => {
                 self.on_block_confirmed(sequence, block_size);
             }
-            (Response::EndBlockDownload, State::BlockDownloadEnd) => self.done(),
+            (Response::EndBlockDownload, State::BlockDownloadEnd) => {
+                self.unsettled = self.sender.repeated;
+                self.done();
+            }
             _ if self.is_beginning() => self.stray(data),
             _ => self.give_up(Fault::Unexpected { command: data.first().copied().unwrap_or(0) }),
         }
@@ -448,14 +466,15 @@ impl<B: Buffer> Client<B> {
             State::DownloadBegun { .. } | State::BlockDownloadBegun { .. } => false,
             _ => return None,
         };
-        (outstanding.upload == upload && outstanding.at == self.at).then_some(outstanding.until)
+        let mine = |at| outstanding.upload == upload && at == self.at;
+        outstanding.at.is_none_or(mine).then_some(outstanding.until)
     }
 
     /// A first answer may come too late from now on.
     fn expect_late(&mut self, until: Option<Duration>) {
         if let Some(until) = until.filter(|_| self.is_beginning() && self.tx.is_none()) {
             let upload = matches!(self.state, State::UploadBegun | State::BlockUploadBegun { .. });
-            self.outstanding = Some(Outstanding { upload, at: self.at, until });
+            self.outstanding = Some(Outstanding { upload, at: Some(self.at), until });
         }
     }
 
@@ -465,12 +484,12 @@ impl<B: Buffer> Client<B> {
         let Some(outstanding) = self.outstanding else { return };
         let answers = match Response::parse(data) {
             Ok(Response::InitiateUpload { at, .. } | Response::InitiateBlockUpload { at, .. }) => {
-                outstanding.upload && at == outstanding.at
+                outstanding.upload && Some(at) == outstanding.at
             }
             Ok(Response::InitiateDownload { at } | Response::InitiateBlockDownload { at, .. }) => {
-                !outstanding.upload && at == outstanding.at
+                !outstanding.upload && Some(at) == outstanding.at
             }
-            Ok(Response::Abort { at, .. }) => at == outstanding.at,
+            Ok(Response::Abort { at, .. }) => Some(at) == outstanding.at,
             _ => false,
         };
         if answers {
@@ -494,6 +513,7 @@ impl<B: Buffer> Client<B> {
 
     #[cold]
     fn fail(&mut self, outcome: Outcome) {
+        self.unsettled |= !self.is_beginning();
         self.done();
         self.state = State::Failed;
         self.failure = outcome;
