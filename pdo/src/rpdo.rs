@@ -135,14 +135,15 @@ impl Rpdo {
 
     #[inline]
     fn receive(&mut self, now: Duration, mut payload: Payload) {
+        let expected = self.length.expected();
         if let Err(fault) = self.length.check(payload.len()) {
             self.fault = Some(fault);
             if matches!(fault, RpdoFault::TooShort(_)) {
                 return;
             }
         }
-        if payload.len() > self.length.expected() {
-            payload = Payload::new(payload.word(), self.length.expected());
+        if payload.len() != expected {
+            payload = Payload::new(payload.word(), expected);
         }
         if !self.timeout.is_zero() {
             self.deadline = Some(after(now, self.timeout));
