@@ -18,7 +18,7 @@ const CHANNEL: Channel = Channel { request: 0x601, response: 0x581 };
 const ADDRESSES: [Address; 4] =
     [Address::new(0x2000, 0), Address::new(0x2000, 1), Address::new(0x1400, 1), Address::new(0x1600, 0)];
 
-fn address(input: &mut Input<'_>) -> Address {
+pub(super) fn address(input: &mut Input<'_>) -> Address {
     let byte = input.u8();
     match ADDRESSES.get(usize::from(byte)) {
         Some(&at) => at,
@@ -189,7 +189,7 @@ fn answered(server: &mut Server, now: Duration, objects: &mut impl Access) {
 
 const LIMITS: Limits = Limits { low: -5, high: 100 };
 
-const TABLE: Table<'static, 7> = match Table::new([
+pub(super) const TABLE: Table<'static, 7> = match Table::new([
     Entry::constant(0x1000, 0, DataType::UNSIGNED32, 0x0003_0191),
     Entry::store(1),
     Entry::variable(0x2000, 0, DataType::INTEGER16, 0).with_limits(&LIMITS).stored().mappable(),

@@ -9,6 +9,7 @@ mod frames;
 mod linmot;
 mod linmot_ops;
 mod master;
+mod network;
 mod trace;
 
 pub use canopen::{od_ops, sdo_client_ops, sdo_server_ops};
@@ -19,13 +20,14 @@ pub use frames::{decode, request, response};
 pub use linmot::{linmot_curve, linmot_curve_file, linmot_linrs, linmot_pvl, linmot_table, linmot_telegrams};
 pub use linmot_ops::{linmot_client_ops, linmot_drive_ops};
 pub use master::master_ops;
+pub use network::{canopen_master_ops, canopen_slave_ops};
 pub use trace::trace;
 
 /// A fuzz target.
 pub type Target = fn(&[u8]);
 
 /// Every target by its name under `fuzz/fuzz_targets` and `fuzz/corpus`.
-pub const TARGETS: [(&str, Target); 26] = [
+pub const TARGETS: [(&str, Target); 28] = [
     ("lb2_decode", decode),
     ("lb2_request", request),
     ("lb2_response", response),
@@ -34,6 +36,8 @@ pub const TARGETS: [(&str, Target); 26] = [
     ("sdo_client_ops", sdo_client_ops),
     ("sdo_server_ops", sdo_server_ops),
     ("od_ops", od_ops),
+    ("canopen_master_ops", canopen_master_ops),
+    ("canopen_slave_ops", canopen_slave_ops),
     ("capture_candump", capture_candump),
     ("capture_asc", capture_asc),
     ("capture_trc", capture_trc),
