@@ -186,8 +186,8 @@ fn what_cannot_run_is_named() {
         std::fs::write(bench.path("run.toml"), text).unwrap();
         bench.run(&["run", "run.toml", "--for", "0.1"])
     };
-    run("[parameters]\n642 = 9999999\n").ends(2).says("[642] = 9999999: Value out of range");
-    run("[parameters]\n0 = 2\n").ends(2).says("[109]");
+    run("[parameters]\n642 = 9999999\n").ends(2).says("= 9999999: Value out of range");
+    run("[parameters]\n0 = 2\n").ends(2).says("109");
     run("[[simulate]]\nkind = \"drive\"\nbus = \"can1\"\nnode = 1\n").ends(2);
     bench.run(&["run", "absent.toml"]).ends(5).says("absent.toml");
 }
