@@ -16,11 +16,21 @@ use crate::output::Output;
 /// Node ID byte of a device without one.
 const NO_NODE: u8 = 255;
 
+/// Fastscans that are made before the last one's outcome counts.
+const SCANS: usize = 5;
+
 pub(crate) fn run(out: &Output, global: &Global, command: &Lss) -> Result<(), Exit> {
     match command {
         Lss::Fastscan { line } => {
             let mut session = Session::open(global, line)?;
-            match operate(&mut session, Operation::Fastscan)? {
+            let mut outcome = operate(&mut session, Operation::Fastscan)?;
+            // An answer that came later than its step took is a wrong bit, which nobody confirms.
+            for _ in 1..SCANS {
+                if matches!(outcome, Outcome::Unconfirmed(_)) {
+                    outcome = operate(&mut session, Operation::Fastscan)?;
+                }
+            }
+            match outcome {
                 Outcome::Identity(identity) => {
                     show(out, identity, None);
                     Ok(())

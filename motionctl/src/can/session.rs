@@ -19,7 +19,8 @@ use crate::exit::Exit;
 const ANSWER: Duration = Duration::from_millis(500);
 /// Where we are the adapter, a host has so long to open its end.
 const PEER: Duration = Duration::from_secs(10);
-/// Time for each step of fastscan: adapters and servers hold answers back for some milliseconds.
+/// Time for each step of fastscan, unless `--timeout` says otherwise: adapters and servers hold answers
+/// back for some milliseconds.
 const FASTSCAN_STEP: Duration = Duration::from_millis(25);
 /// Frames that are still to go out when a command is done have so long.
 const FLUSH: Duration = Duration::from_millis(20);
@@ -182,7 +183,10 @@ impl Session {
         }
         let mut config = Config {
             confirm: answer,
-            lss: canopen_master::lss::Config { answer, fastscan_step: FASTSCAN_STEP },
+            lss: canopen_master::lss::Config {
+                answer,
+                fastscan_step: if global.timeout.is_some() { answer } else { FASTSCAN_STEP },
+            },
             ..Config::default()
         };
         if let CanEndpoint::Slcan { bit_rate, .. } = endpoint {
