@@ -235,6 +235,16 @@ fn a_remote_frame_of_12_bytes_is_damage() {
     assert!(damage.starts_with("line 2: more bytes than such a frame has"), "{damage}");
 }
 
+/// A time whose nanoseconds do not fit 64 bits, in the form that is read fast.
+#[test]
+fn a_time_too_late_to_be_one_is_damage() {
+    let text = "(1754539247.539624) can0 3FF#0200010000000200\n(9754539247.637690) can0 1FF#E40D\n\
+                (9223372036.999999) can0 1FF#E40D\n";
+    let (_, frames, damage) = read(text.as_bytes());
+    assert_eq!((frames.len(), damage.len()), (1, 2), "{damage:?}");
+    assert!(damage[0].starts_with("line 2: a time in brackets expected"), "{damage:?}");
+}
+
 #[test]
 fn damaged_lines_are_reported_with_their_number() {
     let long = "x".repeat(600_000);

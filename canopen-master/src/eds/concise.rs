@@ -199,10 +199,10 @@ impl Device {
     }
 }
 
-/// The text of which a file gives exactly these bytes back.
+/// The text of which a file gives exactly these bytes back; a text file has no zero bytes.
 fn text_of(bytes: &[u8], data_type: DataType) -> Option<String> {
     let text = from_bytes(bytes, data_type);
-    let holds = !text.is_empty() && text.trim() == text && !text.contains(['\r', '\n']);
+    let holds = !text.is_empty() && text.trim() == text && !text.contains(['\r', '\n', '\0']);
     (holds && to_bytes(&text, data_type, None).as_deref() == Ok(bytes)).then_some(text)
 }
 

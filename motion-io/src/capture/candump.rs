@@ -52,9 +52,11 @@ impl Candump {
             micros = micros * 10 + u32::from(digit - b'0');
         }
         if self.seconds.0 != *seconds {
-            self.seconds = (*seconds, decimal(seconds)? as i64 * SECONDS);
+            let whole = i64::try_from(decimal(seconds)?).ok()?;
+            // A time that does not fit is told by the general reader.
+            self.seconds = (*seconds, whole.checked_mul(SECONDS)?);
         }
-        record.time = Some(Time(self.seconds.1 + i64::from(micros) * 1000));
+        record.time = Some(Time(self.seconds.1.checked_add(i64::from(micros) * 1000)?));
         record.bus = Some(bus);
         record.direction = None;
         record.loopback = false;
