@@ -52,6 +52,17 @@ impl LengthCheck {
         self.expected
     }
 
+    /// A PDO has come: whether it has as many bytes as are mapped. If not, [`check`](Self::check) says
+    /// what becomes of it.
+    #[inline]
+    pub const fn fits(&mut self, found: u8) -> bool {
+        let fits = found == self.expected;
+        if fits {
+            self.was_too_long = false;
+        }
+        fits
+    }
+
     /// A PDO has come.
     ///
     /// # Errors
@@ -59,11 +70,7 @@ impl LengthCheck {
     /// mapped; told once, until one of the right length has come.
     #[inline]
     pub const fn check(&mut self, found: u8) -> Result<(), RpdoFault> {
-        if found == self.expected {
-            self.was_too_long = false;
-            return Ok(());
-        }
-        self.judge(found)
+        if self.fits(found) { Ok(()) } else { self.judge(found) }
     }
 
     #[cold]

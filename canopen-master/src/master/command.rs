@@ -155,11 +155,7 @@ impl<'d, B: Buffer, const N: usize> Master<'d, B, N> {
         let Some(node) = self.node_mut(id).filter(|node| node.is_free()) else {
             return Err(Refused { error: SubmitError::Busy(id), buffer });
         };
-        let begun = if write {
-            node.sdo.download_as(at, buffer, options, Data::User)
-        } else {
-            node.sdo.upload_as(at, buffer, options, Data::User)
-        };
+        let begun = node.sdo.submit(at, buffer, options, write, Data::User);
         let ticket =
             begun.map_err(|sdo::Refused { error, buffer }| Refused { error: error.into(), buffer })?;
         self.sdo_busy.insert(id);

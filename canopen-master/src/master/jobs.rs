@@ -112,14 +112,14 @@ impl<'d, B: Buffer, const N: usize> Master<'d, B, N> {
 
     /// Begins with the next node of a scan, unless one that has begun still has to send something.
     pub(super) fn start_scan(&mut self) {
-        if !self.sdo_ready.and(self.paced).is_empty() {
+        if !self.sdo_ready.and(self.pace.nodes()).is_empty() {
             return;
         }
         let Some(id) = self.scan_candidate() else { return };
         let Some(scan) = &mut self.scan else { return };
         scan.todo.remove(id);
         scan.active.insert(id);
-        self.paced.insert(id);
+        self.pace.add(id);
         let timeout = scan.options.answer;
         if let Some(node) = self.node_mut(id) {
             node.job = Job::Scan(ScanStep::DeviceType);
@@ -129,7 +129,7 @@ impl<'d, B: Buffer, const N: usize> Master<'d, B, N> {
 
     /// When the next frame of a scan may be sent.
     pub(super) fn scan_due(&self) -> Option<Duration> {
-        let waits = !self.sdo_ready.and(self.paced).is_empty() || self.scan_candidate().is_some();
+        let waits = !self.sdo_ready.and(self.pace.nodes()).is_empty() || self.scan_candidate().is_some();
         waits.then(|| self.pace.opens())
     }
 

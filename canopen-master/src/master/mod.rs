@@ -153,8 +153,6 @@ pub struct Master<'d, B, const N: usize> {
     nmt_waiting: NodeSet,
     next_ticket: u32,
     scan: Option<ScanJob>,
-    /// Nodes whose frames are a scan's, until all are sent.
-    paced: NodeSet,
     pace: Pace,
     events: Ring<Notice, EVENTS>,
     lost_events: u32,
@@ -213,7 +211,6 @@ impl<'d, B: Buffer, const N: usize> Master<'d, B, N> {
             nmt_waiting: NodeSet::EMPTY,
             next_ticket: 0,
             scan: None,
-            paced: NodeSet::EMPTY,
             pace: Pace::new(config.bit_rate),
             events: Ring::new(),
             lost_events: 0,

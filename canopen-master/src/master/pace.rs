@@ -2,7 +2,10 @@
 
 use core::time::Duration;
 
+use pdo::NodeId;
+
 use crate::clock::{after, before, is_due};
+use crate::node_set::NodeSet;
 
 /// Frames that may wait when a scan adds one: the transmit queue stays shorter than 8 (decision 15).
 const WAITING: u32 = 6;
@@ -19,43 +22,66 @@ const fn longest(bytes: usize) -> u32 {
 /// error frames hold the bus up.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Pace {
-    bit: Duration,
-    /// A frame of 8 bytes.
-    frame: Duration,
-    /// As many as may wait.
-    ahead: Duration,
+    /// ns.
+    bit: u32,
     /// When all that was handed out is sent.
     sent: Duration,
+    /// Nodes whose frames are a scan's, until all are sent.
+    nodes: NodeSet,
+    /// Whether there are such nodes: asked at every frame.
+    on: bool,
 }
 
 impl Pace {
     pub(super) const fn new(bit_rate: u32) -> Self {
         let rate = if bit_rate == 0 { 1 } else { bit_rate };
-        let bit = 1_000_000_000_u64.div_ceil(rate as u64);
-        let frame = bit * longest(8) as u64;
-        Self {
-            bit: Duration::from_nanos(bit),
-            frame: Duration::from_nanos(frame),
-            ahead: Duration::from_nanos(frame * WAITING as u64),
-            sent: Duration::ZERO,
-        }
+        Self { bit: 1_000_000_000_u32.div_ceil(rate), sent: Duration::ZERO, nodes: NodeSet::EMPTY, on: false }
+    }
+
+    /// A scan asks a node: its frames are paced until it is [`released`](Self::release).
+    pub(super) const fn add(&mut self, node: NodeId) {
+        self.nodes.insert(node);
+        self.on = true;
+    }
+
+    /// The scan has nothing more to send to a node.
+    pub(super) const fn release(&mut self, node: NodeId) {
+        self.nodes.remove(node);
+        self.on = !self.nodes.is_empty();
+    }
+
+    /// Nodes whose frames are paced.
+    pub(super) const fn nodes(&self) -> NodeSet {
+        self.nodes
+    }
+
+    /// Whether there are such nodes.
+    #[inline]
+    pub(super) const fn is_on(&self) -> bool {
+        self.on
+    }
+
+    /// Time of so many bits on the wire.
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    #[cfg_attr(not(target_pointer_width = "32"), inline)]
+    const fn time(&self, bits: u32) -> Duration {
+        Duration::from_nanos(self.bit as u64 * bits as u64)
     }
 
     /// A frame was handed out.
     #[inline]
     pub(super) fn hand_out(&mut self, now: Duration) {
-        self.sent = after(self.sent.max(now), self.frame);
+        self.sent = after(self.sent.max(now), self.time(longest(8)));
     }
 
     /// It was not taken.
     pub(super) fn take_back(&mut self) {
-        self.sent = before(self.sent, self.frame);
+        self.sent = before(self.sent, self.time(longest(8)));
     }
 
     /// A frame of another station has gone over the wire; ours waited meanwhile.
     pub(super) fn hear(&mut self, now: Duration, bytes: usize) {
-        let time = self.bit * longest(bytes);
-        let later = after(self.sent, time);
+        let later = after(self.sent, self.time(longest(bytes)));
         if !is_due(Some(later), now) {
             self.sent = later;
         }
@@ -63,7 +89,7 @@ impl Pace {
 
     /// When one more frame may be handed out.
     pub(super) fn opens(&self) -> Duration {
-        before(self.sent, self.ahead)
+        before(self.sent, self.time(WAITING * longest(8)))
     }
 }
 

@@ -3,7 +3,7 @@
 use core::time::Duration;
 
 use embedded_can::Id;
-use pdo::{DefaultPdo, Handled, NodeId, RpdoFault, cob};
+use pdo::{DefaultPdo, Handled, NodeId, cob};
 
 use super::event::Notice;
 use super::node::Job;
@@ -12,13 +12,14 @@ use crate::boot::Action;
 use crate::emcy::{Emergency, Entry};
 use crate::nmt::State;
 use crate::sdo::Buffer;
+use crate::{guarding, heartbeat};
 
 impl<'d, B: Buffer, const N: usize> Master<'d, B, N> {
     /// Takes a frame from the bus. Identifiers of the predefined connection set from nodes 1 to `N`
     /// are the master's; anything else is ignored, so that other engines can share the bus.
     #[inline]
     pub fn handle_frame<F: embedded_can::Frame>(&mut self, now: Duration, frame: &F) -> Handled {
-        if !self.paced.is_empty() {
+        if self.pace.is_on() {
             self.pace.hear(now, frame.dlc());
         }
         let Id::Standard(id) = frame.id() else { return Handled::Ignored };
@@ -45,29 +46,35 @@ impl<'d, B: Buffer, const N: usize> Master<'d, B, N> {
 
     #[cfg_attr(target_pointer_width = "32", inline(never))]
     #[cfg_attr(not(target_pointer_width = "32"), inline)]
-    fn on_pdo(&mut self, number: usize, id: NodeId, data: &[u8]) {
-        let Some(node) = self.nodes.get_mut(usize::from(id.raw()) - 1) else { return };
-        let (Some(image), Some(length)) = (node.inputs.get_mut(number), node.lengths.get_mut(number)) else {
-            return;
-        };
-        let (Some(new), Some(flag)) = (self.input_new.get_mut(number), self.input_flag.get_mut(number))
-        else {
-            return;
-        };
-        let mut mapped = data;
-        let mut result = Ok(());
-        if let Some(length) = length {
-            result = length.check(data.len() as u8);
-            mapped = data.get(..usize::from(length.expected())).unwrap_or(data);
+    fn on_pdo(&mut self, number: usize, id: NodeId, mut data: &[u8]) {
+        let index = usize::from(id.raw()) - 1;
+        let lengths = self.nodes.get_mut(index).map(|node| &mut node.lengths);
+        if let Some(Some(length)) = lengths.and_then(|lengths| lengths.get_mut(number))
+            && !length.fits(data.len() as u8)
+        {
+            let Some(mapped) = self.on_pdo_length(number, id, data) else { return };
+            data = mapped;
         }
-        if !matches!(result, Err(RpdoFault::TooShort(_))) {
-            image.set(mapped);
+        let image = self.nodes.get_mut(index).and_then(|node| node.inputs.get_mut(number));
+        let sets = self.input_new.get_mut(number).zip(self.input_flag.get_mut(number));
+        if let Some((image, (new, flag))) = image.zip(sets) {
+            image.set(data);
             new.insert(id);
             flag.insert(id);
         }
-        if let (Err(fault), Some(number)) = (result, DefaultPdo::new(number as u8 + 1)) {
+    }
+
+    /// A PDO is not as long as its mapping: what is taken of it.
+    #[cold]
+    #[inline(never)]
+    fn on_pdo_length<'a>(&mut self, number: usize, id: NodeId, data: &'a [u8]) -> Option<&'a [u8]> {
+        let node = self.nodes.get_mut(usize::from(id.raw()) - 1)?;
+        let length = node.lengths.get_mut(number)?.as_mut()?;
+        let (fault, mapped) = (length.check(data.len() as u8).err(), usize::from(length.expected()));
+        if let Some((fault, number)) = fault.zip(DefaultPdo::new(number as u8 + 1)) {
             self.tell(Notice::Pdo(id, number, fault));
         }
+        data.get(..mapped)
     }
 
     #[inline]
@@ -98,25 +105,21 @@ impl<'d, B: Buffer, const N: usize> Master<'d, B, N> {
         }
         let Some(node) = self.node_mut(id) else { return };
         let toggled = byte & 0x80 != 0;
+        let (mut guarding, mut heartbeat, mut at) = (None, None, None);
         match (&mut node.guard, &mut node.heartbeat) {
             (Some(guard), heartbeat) if heartbeat.is_none() || guard.is_answer(byte) => {
-                let event = guard.handle_answer(now, byte);
-                if let Some(event) = event {
-                    self.tell(Notice::Guarding(id, event));
-                    if matches!(event, crate::guarding::Event::Toggle { .. }) {
-                        return;
-                    }
-                }
+                guarding = guard.handle_answer(now, byte);
             }
             (_, Some(consumer)) if !toggled => {
-                let event = consumer.handle(now);
-                let at = consumer.poll_timeout();
-                self.due(at);
-                if let Some(event) = event {
-                    self.tell(Notice::Heartbeat(id, event));
-                }
+                heartbeat = consumer.handle(now);
+                at = consumer.poll_timeout();
             }
             _ => {}
+        }
+        self.due(at);
+        self.tell_error_control(id, guarding, heartbeat);
+        if matches!(guarding, Some(guarding::Event::Toggle { .. })) {
+            return;
         }
         self.note_state(now, id, state);
         let awaited = toggled || self.nmt_waiting.contains(id);
@@ -125,11 +128,27 @@ impl<'d, B: Buffer, const N: usize> Master<'d, B, N> {
         }
     }
 
+    /// What guarding and heartbeat have noticed.
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    pub(super) fn tell_error_control(
+        &mut self,
+        id: NodeId,
+        guarding: Option<guarding::Event>,
+        heartbeat: Option<heartbeat::Event>,
+    ) {
+        if let Some(event) = guarding {
+            self.tell(Notice::Guarding(id, event));
+        }
+        if let Some(event) = heartbeat {
+            self.tell(Notice::Heartbeat(id, event));
+        }
+    }
+
     fn on_boot_up(&mut self, now: Duration, id: NodeId) {
         let Some(node) = self.node_mut(id) else { return };
         let guarding = node.guard.as_mut().and_then(|guard| guard.handle_boot_up(now));
         let heartbeat = node.heartbeat.as_mut().and_then(|consumer| consumer.handle(now));
-        let at = node.heartbeat.as_ref().and_then(crate::heartbeat::Consumer::poll_timeout);
+        let at = node.heartbeat.as_ref().and_then(heartbeat::Consumer::poll_timeout);
         // It comes to pre-operational by itself (CiA 301, 7.3.2.2.2).
         node.state = Some(State::PreOperational);
         let action = match &mut node.job {
@@ -139,12 +158,7 @@ impl<'d, B: Buffer, const N: usize> Master<'d, B, N> {
         self.seen.insert(id);
         self.due(at);
         self.tell(Notice::BootUp(id));
-        if let Some(event) = guarding {
-            self.tell(Notice::Guarding(id, event));
-        }
-        if let Some(event) = heartbeat {
-            self.tell(Notice::Heartbeat(id, event));
-        }
+        self.tell_error_control(id, guarding, heartbeat);
         self.confirm(id, State::BootUp);
         self.carry_out(now, id, action);
     }

@@ -48,11 +48,12 @@ impl<B: Buffer, const N: usize> Master<'_, B, N> {
 
     fn node_timeout(&mut self, now: Duration, id: NodeId) {
         let on = self.bus.is_on();
-        let Some(node) = self.node_mut(id) else { return };
-        let next = node.poll_timeout(on);
+        // Most nodes: what is usual of them stays so.
+        let next = self.node(id).and_then(|node| node.poll_timeout(on));
         if !is_due(next, now) {
             return self.due(next);
         }
+        let Some(node) = self.node_mut(id) else { return };
         if let Job::Boot(process) = &mut node.job {
             let action = process.on_timeout(now);
             if !matches!(action, Action::Wait) {
@@ -67,12 +68,7 @@ impl<B: Buffer, const N: usize> Master<'_, B, N> {
             if due {
                 self.guard_due.insert(id);
             }
-            if let Some(event) = guarding {
-                self.tell(Notice::Guarding(id, event));
-            }
-            if let Some(event) = heartbeat {
-                self.tell(Notice::Heartbeat(id, event));
-            }
+            self.tell_error_control(id, guarding, heartbeat);
         }
         if self.sdo_busy.contains(id) {
             if let Some(node) = self.node_mut(id) {

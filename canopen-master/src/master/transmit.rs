@@ -43,11 +43,11 @@ impl<B: Buffer, const N: usize> Master<'_, B, N> {
             return Some(frame);
         }
         let mut held = NodeSet::EMPTY;
-        if self.scan.is_some() || !self.paced.is_empty() {
+        if self.scan.is_some() || self.pace.is_on() {
             if is_due(Some(self.pace.opens()), now) {
                 self.start_scan();
             } else {
-                held = self.paced;
+                held = self.pace.nodes();
             }
         }
         self.poll_sdo(now, held).or_else(|| self.lss.poll_transmit(now))
@@ -105,7 +105,7 @@ impl<B: Buffer, const N: usize> Master<'_, B, N> {
                 None => {
                     self.sdo_ready.remove(id);
                     if !scanning {
-                        self.paced.remove(id);
+                        self.pace.release(id);
                     }
                 }
             }

@@ -4,9 +4,9 @@ use core::time::Duration;
 
 use pdo::Frame;
 
+use super::super::Buffer;
 use super::super::block::{Confirmed, MAX_BLOCK_SIZE, Receiver, STALLS, Sender, is_block_size};
 use super::super::message::{ABORT, BlockSegment, Content, Request, Response, SEGMENT};
-use super::super::{Address, Buffer};
 use super::segmented::next_piece;
 use super::{Client, Fault, State};
 use crate::clock::after;
@@ -31,18 +31,13 @@ impl Default for Block {
 }
 
 impl<B: Buffer> Client<B> {
-    pub(super) fn begin_block_upload(&mut self, at: Address, block: &Block) {
-        let block_size = if is_block_size(block.block_size) { block.block_size } else { MAX_BLOCK_SIZE };
-        self.receiver = Receiver::new(block_size, block.crc);
+    pub(super) fn begin_block_upload(&mut self, block: &Block) -> Request {
+        let Block { block_size, crc, threshold } = *block;
+        let block_size = if is_block_size(block_size) { block_size } else { MAX_BLOCK_SIZE };
+        self.receiver = Receiver::new(block_size, crc);
         self.held = None;
-        let (crc, threshold) = (block.crc, block.threshold);
-        self.tx = Some(Request::InitiateBlockUpload { at, crc, block_size, threshold }.encode());
         self.state = State::BlockUploadBegun { threshold };
-    }
-
-    pub(super) fn begin_block_download(&mut self, at: Address, block: &Block, size: Option<u32>) {
-        self.tx = Some(Request::InitiateBlockDownload { at, crc: block.crc, size }.encode());
-        self.state = State::BlockDownloadBegun { crc: block.crc };
+        Request::InitiateBlockUpload { at: self.at, crc, block_size, threshold }
     }
 
     /// The server answers without blocks. One that has none does so above the threshold, too; the data

@@ -9,7 +9,7 @@ use core::time::Duration;
 use pdo::{Frame, Handled};
 
 use super::block::{Receiver, Sender};
-use super::message::{ABORT, Request, Response, SEGMENT};
+use super::message::{ABORT, Content, Request, Response, SEGMENT};
 use super::{AbortCode, Address, Buffer, Channel, data_on};
 use crate::clock::{after, is_due};
 pub use block::Block;
@@ -88,6 +88,14 @@ enum State {
     Done,
     /// It ended otherwise.
     Failed,
+}
+
+/// What the first request says.
+#[derive(Debug, Clone, Copy)]
+enum Opening {
+    Upload,
+    Download(Content),
+    BlockDownload { crc: bool, size: Option<u32> },
 }
 
 /// The answer to a request that was given up, which may still come.
@@ -202,32 +210,9 @@ impl<B: Buffer> Client<B> {
     ///
     /// # Errors
     /// [`SubmitError::Busy`] until the last outcome has been polled.
-    #[cfg_attr(target_pointer_width = "32", inline(never))]
-    #[cfg_attr(not(target_pointer_width = "32"), inline)]
-    pub fn upload(&mut self, at: Address, buffer: B, options: &Options) -> Result<Ticket, Refused<B>> {
-        self.upload_as(at, buffer, options, |buffer| buffer)
-    }
-
-    /// The same where the client's buffer is made of the caller's.
     #[inline]
-    pub(crate) fn upload_as<U>(
-        &mut self,
-        at: Address,
-        buffer: U,
-        options: &Options,
-        wrap: impl FnOnce(U) -> B,
-    ) -> Result<Ticket, Refused<U>> {
-        if !self.is_idle() {
-            return Err(Refused { error: SubmitError::Busy, buffer });
-        }
-        self.size = None;
-        if let Some(block) = &options.block {
-            self.begin_block_upload(at, block);
-        } else {
-            self.tx = Some(Request::InitiateUpload { at }.encode());
-            self.state = State::UploadBegun;
-        }
-        Ok(self.begin(at, wrap(buffer), options))
+    pub fn upload(&mut self, at: Address, buffer: B, options: &Options) -> Result<Ticket, Refused<B>> {
+        self.submit(at, buffer, options, false, |buffer| buffer)
     }
 
     /// Writes what `buffer` holds to an object.
@@ -237,45 +222,62 @@ impl<B: Buffer> Client<B> {
     /// buffer cannot be read.
     #[inline]
     pub fn download(&mut self, at: Address, buffer: B, options: &Options) -> Result<Ticket, Refused<B>> {
-        self.download_as(at, buffer, options, |buffer| buffer)
+        self.submit(at, buffer, options, true, |buffer| buffer)
     }
 
     /// The same where the client's buffer is made of the caller's.
     #[inline]
-    pub(crate) fn download_as<U: Buffer>(
+    pub(crate) fn submit<U: Buffer>(
         &mut self,
         at: Address,
         mut buffer: U,
         options: &Options,
+        write: bool,
         wrap: impl FnOnce(U) -> B,
     ) -> Result<Ticket, Refused<U>> {
         if !self.is_idle() {
             return Err(Refused { error: SubmitError::Busy, buffer });
         }
-        self.size = buffer.size();
-        if let Some(block) = &options.block
-            && self.size.is_none_or(|size| size > u32::from(block.threshold))
-        {
-            self.begin_block_download(at, block, self.size);
-            return Ok(self.begin(at, wrap(buffer), options));
+        let opening =
+            if write { segmented::open_download(&mut buffer, options) } else { Ok(Opening::Upload) };
+        match opening {
+            Ok(opening) => {
+                self.buffer = Some(wrap(buffer));
+                Ok(self.begin(at, opening, options))
+            }
+            Err(code) => Err(Refused { error: SubmitError::Source(code), buffer }),
         }
-        let begun = segmented::begin_download(at, &mut buffer, self.size);
-        let (tx, sent) = match begun {
-            Ok(begun) => begun,
-            Err(code) => return Err(Refused { error: SubmitError::Source(code), buffer }),
-        };
-        self.tx = Some(tx);
-        self.state = State::DownloadBegun { sent };
-        Ok(self.begin(at, wrap(buffer), options))
     }
 
-    #[inline]
-    fn begin(&mut self, at: Address, buffer: B, options: &Options) -> Ticket {
+    #[cfg_attr(target_pointer_width = "32", inline(never))]
+    #[cfg_attr(not(target_pointer_width = "32"), inline)]
+    fn begin(&mut self, at: Address, opening: Opening, options: &Options) -> Ticket {
         self.at = at;
-        self.buffer = Some(buffer);
+        self.size = None;
         self.timeout = options.timeout;
-        self.deadline = None;
         self.offset = 0;
+        let request = match (opening, &options.block) {
+            (Opening::Upload, None) => {
+                self.state = State::UploadBegun;
+                Request::InitiateUpload { at }
+            }
+            (Opening::Upload, Some(block)) => self.begin_block_upload(block),
+            (Opening::Download(content), _) => {
+                let (size, sent) = match content {
+                    Content::Expedited { data, .. } => (Some(data.len() as u32), data.len() as u8),
+                    Content::Segmented(size) => (size, 0),
+                };
+                self.size = size;
+                self.state = State::DownloadBegun { sent };
+                Request::InitiateDownload { at, content }
+            }
+            (Opening::BlockDownload { crc, size }, _) => {
+                self.size = size;
+                self.state = State::BlockDownloadBegun { crc };
+                Request::InitiateBlockDownload { at, crc, size }
+            }
+        };
+        self.send(request);
         self.ticket = self.ticket.wrapping_add(1);
         Ticket(self.ticket)
     }

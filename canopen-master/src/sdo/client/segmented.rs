@@ -1,30 +1,27 @@
 //! Expedited and segmented transfers (CiA 301, 7.2.4.2.2, 7.2.4.2.9).
 
 use super::super::message::{Bytes, Content, Request, SEGMENT, first, segment};
-use super::super::{AbortCode, Address, Buffer};
-use super::{Client, Fault, State};
+use super::super::{AbortCode, Buffer};
+use super::{Block, Client, Fault, Opening, Options, State};
 
-/// The first frame of a download and how many bytes went with it.
+/// How a download begins: in blocks above their threshold, else with the data if they are few.
 #[inline]
-pub(super) fn begin_download(
-    at: Address,
-    buffer: &mut impl Buffer,
-    size: Option<u32>,
-) -> Result<([u8; 8], u8), AbortCode> {
-    let mut data = [0; 4];
-    let content = match size {
-        Some(size @ 1..=4) => {
-            let out = data.get_mut(..size as usize).unwrap_or_default();
-            if buffer.read(0, out)? != out.len() {
-                return Err(AbortCode::NO_DATA);
-            }
-            let data = Bytes::new(out).unwrap_or(Bytes::EMPTY);
-            Content::Expedited { data, sized: true }
-        }
-        size => Content::Segmented(size),
+pub(super) fn open_download(buffer: &mut impl Buffer, options: &Options) -> Result<Opening, AbortCode> {
+    let size = buffer.size();
+    let blocks = |block: &&Block| size.is_none_or(|size| size > u32::from(block.threshold));
+    if let Some(block) = options.block.as_ref().filter(blocks) {
+        return Ok(Opening::BlockDownload { crc: block.crc, size });
+    }
+    let Some(size @ 1..=4) = size else {
+        return Ok(Opening::Download(Content::Segmented(size)));
     };
-    let sent = if let Content::Expedited { data, .. } = content { data.len() as u8 } else { 0 };
-    Ok((Request::InitiateDownload { at, content }.encode(), sent))
+    let mut data = [0; 4];
+    let out = data.get_mut(..size as usize).unwrap_or_default();
+    if buffer.read(0, out)? != out.len() {
+        return Err(AbortCode::NO_DATA);
+    }
+    let data = Bytes::new(out).unwrap_or(Bytes::EMPTY);
+    Ok(Opening::Download(Content::Expedited { data, sized: true }))
 }
 
 /// The next piece to download: up to 7 bytes, their number, and whether no more follow.
