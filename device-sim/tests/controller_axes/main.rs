@@ -3,4 +3,5 @@
 mod failures;
 mod hour;
 mod limits;
+mod objects;
 mod rig;
