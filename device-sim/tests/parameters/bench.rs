@@ -97,7 +97,7 @@ impl Bench {
     }
 
     /// The same with further changes, of single indices.
-    fn with(route: Route, mode: i32, changes: &[(u16, i32)], single: &[(u16, i32)]) -> Self {
+    pub(crate) fn with(route: Route, mode: i32, changes: &[(u16, i32)], single: &[(u16, i32)]) -> Self {
         let mut controller = Controller::power_on(Model::Gel8231, vec![0xFF; STORAGE_LEN], vec![0; BANK_LEN]);
         let axes = (0..6u16).flat_map(|at| SETTINGS.map(|(first, value)| (first + at, value)));
         let signals = mode == SIGNALS;

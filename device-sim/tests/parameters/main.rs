@@ -4,6 +4,7 @@
 mod bench;
 mod calibration;
 mod control;
+mod gearing;
 mod inputs;
 mod jog;
 mod limits;
