@@ -1,5 +1,8 @@
 //! The communication of a virtual node.
 
+mod bus;
+mod serving;
+
 use core::fmt;
 use core::time::Duration;
 use std::collections::VecDeque;
@@ -7,19 +10,15 @@ use std::collections::VecDeque;
 use canopen_master::emcy::{self, Emergency, ErrorCode};
 use canopen_master::lss::{self, BitTiming, Identity};
 use canopen_master::nmt::{self, Change, Command, State};
-use canopen_master::sdo::{self, AbortCode, Access, Channel, NEXT_REQUEST, Piece, Total, read_slice};
+use canopen_master::sdo::{self, Channel, NEXT_REQUEST};
 use canopen_master::{guarding, heartbeat, sync};
-use pdo::{Address, Frame, NodeId, cob};
+use pdo::{Address, Frame, NodeId};
 
 use super::common::PDOS;
 use super::objects::Objects;
-use super::pdo::{Pdos, Received, check};
+use super::pdo::{Pdos, Received};
 use super::{Context, Device};
-use crate::can;
 
-/// "save" and "load", the signatures of 1010h and 1011h (CiA 301, 7.5.2.13).
-const SAVE: &[u8] = b"save";
-const LOAD: &[u8] = b"load";
 /// Emergencies that wait for the inhibit time.
 const EMERGENCIES: usize = 8;
 
@@ -265,57 +264,6 @@ impl<D: Device> Node<D> {
         self.with(now, |device, context| device.state(context, state));
     }
 
-    fn serve<T>(
-        &mut self,
-        now: Duration,
-        work: impl FnOnce(&mut sdo::Server, &mut Serving<'_, D>) -> T,
-    ) -> T {
-        let mut emergencies = Vec::new();
-        let mut changed = Vec::new();
-        let done = {
-            let mut serving = Serving {
-                now,
-                state: self.nmt.state(),
-                device: &mut self.device,
-                objects: &mut self.objects,
-                download: &mut self.download,
-                emergencies: &mut emergencies,
-                changed: &mut changed,
-            };
-            work(&mut self.sdo, &mut serving)
-        };
-        for emergency in emergencies {
-            self.emergency(emergency);
-        }
-        for at in changed {
-            self.changed(now, at);
-        }
-        done
-    }
-
-    /// After a write over SDO.
-    fn changed(&mut self, now: Duration, at: Address) {
-        match at.index {
-            0x1003 => {
-                self.emergencies.clear_history();
-                self.show_history();
-            }
-            0x1010 => {
-                self.objects.set(0x1010, 1, 1);
-                let mut kept = self.objects.clone();
-                kept.set(0x1001, 0, 0);
-                self.stored = Some(kept);
-            }
-            // The factory's values come back with the next start (CiA 301, 7.5.2.14).
-            0x1011 => {
-                self.objects.set(0x1011, 1, 1);
-                self.stored = None;
-            }
-            0x1005 | 0x1006 | 0x100C | 0x100D | 0x1015..=0x1017 | 0x1019 => self.configure(now),
-            _ => {}
-        }
-    }
-
     fn rpdo(&mut self, now: Duration, frame: &Frame) {
         for (number, received) in self.pdos.receive(now, &mut self.objects, frame) {
             let index = (0x1600 + number).to_le_bytes();
@@ -401,229 +349,5 @@ impl<D: Device> Node<D> {
         {
             self.master(now, false);
         }
-    }
-}
-
-impl<D: Device> can::Node for Node<D> {
-    fn handle_frame(&mut self, now: Duration, frame: &Frame) {
-        if !self.started {
-            self.boot(now);
-        }
-        let Some(id) = frame.standard_id() else { return };
-        if let Some(request) = lss::Request::from_frame(frame) {
-            return self.lss(now, request);
-        }
-        let Some(own) = self.lss.node() else { return };
-        let state = self.nmt.state();
-        if id == cob::NMT {
-            self.nmt(now, frame);
-        } else if let Some(event) = self.sync.handle_frame(now, frame) {
-            if state.has_sdo() {
-                self.synchronise(now, event);
-            }
-        } else if id == cob::SDO_REQUEST + u16::from(own.raw()) {
-            if state.has_sdo() {
-                self.serve(now, |sdo, objects| sdo.handle_frame(now, frame, objects));
-            }
-        } else if let Some(other) =
-            id.checked_sub(cob::ERROR_CONTROL).and_then(|node| NodeId::new(node as u8).ok())
-        {
-            self.error_control(now, frame, other);
-        } else if state.has_pdo() {
-            self.with(now, Device::update);
-            self.rpdo(now, frame);
-        }
-        if self.nmt.state().has_pdo() {
-            self.look(now);
-        }
-    }
-
-    fn handle_timeout(&mut self, now: Duration) {
-        if !self.started {
-            self.boot(now);
-        }
-        self.serve(now, |sdo, objects| sdo.handle_timeout(now, objects));
-        if self.guard.handle_timeout(now) == Some(guarding::Event::Lost) {
-            self.master(now, true);
-        }
-        let lost = self.masters.iter_mut().filter_map(|(_, consumer)| consumer.handle_timeout(now)).count();
-        if lost > 0 {
-            self.master(now, true);
-        }
-        let _ = self.sync.handle_timeout(now);
-        if self.device.poll_timeout().is_some_and(|at| at <= now) {
-            self.with(now, Device::update);
-        }
-        if self.nmt.state().has_pdo() {
-            for _ in 0..self.pdos.timed_out(now) {
-                self.communication_error(ErrorCode::RPDO_TIMEOUT, [0; 5]);
-            }
-            self.look(now);
-        }
-    }
-
-    fn poll_transmit(&mut self, now: Duration) -> Option<Frame> {
-        if !self.started {
-            self.boot(now);
-        }
-        if let Some(frame) = self.out.pop_front() {
-            return Some(frame);
-        }
-        let id = self.lss.node()?;
-        let state = self.nmt.state();
-        if state.has_sdo()
-            && let Some(emergency) = self.emergencies.poll_transmit(now)
-        {
-            return Some(emergency.frame(id));
-        }
-        if let Some(frame) = self.heartbeat.poll_transmit(now, state) {
-            return Some(frame);
-        }
-        if state.has_pdo() {
-            self.with(now, Device::update);
-            if let Some(frame) = self.pdos.transmit(now, &self.objects) {
-                return Some(frame);
-            }
-        }
-        self.serve(now, |sdo, objects| sdo.poll_transmit(now, objects))
-    }
-
-    fn poll_timeout(&self) -> Option<Duration> {
-        if !self.started {
-            return Some(Duration::ZERO);
-        }
-        self.lss.node()?;
-        let state = self.nmt.state();
-        let emergency = self.emergencies.poll_timeout().filter(|_| state.has_sdo());
-        let pdos = if state.has_pdo() { self.pdos.poll_timeout(&self.objects) } else { None };
-        [
-            self.sdo.poll_timeout(),
-            self.guard.poll_timeout(),
-            self.heartbeat.poll_timeout(),
-            self.sync.poll_timeout(),
-            self.device.poll_timeout(),
-            emergency,
-            pdos,
-        ]
-        .into_iter()
-        .chain(self.masters.iter().map(|(_, consumer)| consumer.poll_timeout()))
-        .flatten()
-        .min()
-    }
-
-    fn handle_bus(&mut self, _now: Duration, event: can::Event) {
-        match event {
-            can::Event::State(can::State::Passive) => {
-                self.communication_error(ErrorCode::CAN_PASSIVE, [0; 5]);
-            }
-            can::Event::State(can::State::BusOff) => self.was_off = true,
-            can::Event::State(can::State::Active) if core::mem::take(&mut self.was_off) => {
-                self.communication_error(ErrorCode::BUS_OFF_RECOVERED, [0; 5]);
-            }
-            _ => {}
-        }
-    }
-}
-
-/// The objects as the SDO server sees them.
-struct Serving<'a, D> {
-    now: Duration,
-    state: State,
-    device: &'a mut D,
-    objects: &'a mut Objects,
-    download: &'a mut Vec<u8>,
-    emergencies: &'a mut Vec<Emergency>,
-    changed: &'a mut Vec<Address>,
-}
-
-impl<D: Device> Serving<'_, D> {
-    fn context(&mut self) -> (&mut D, Context<'_>) {
-        let Self { now, state, device, objects, emergencies, .. } = self;
-        (device, Context { now: *now, objects, state: *state, emergencies })
-    }
-
-    fn may_write(&self, at: Address) -> Result<(), AbortCode> {
-        let entry = self.objects.entry(at).ok_or_else(|| self.objects.missing(at))?;
-        if entry.rights.write { Ok(()) } else { Err(AbortCode::READ_ONLY) }
-    }
-
-    fn store(&mut self, at: Address, value: &[u8]) -> Result<(), AbortCode> {
-        self.may_write(at)?;
-        if let Some(entry) = self.objects.entry(at) {
-            entry.check(value)?;
-        }
-        match at.index {
-            0x1003 if value != [0] => return Err(AbortCode::INVALID_VALUE),
-            0x1010 if value != SAVE => return Err(AbortCode::CANNOT_STORE),
-            0x1011 if value != LOAD => return Err(AbortCode::CANNOT_STORE),
-            _ => {}
-        }
-        if let Some(allowed) = check(self.objects, at, value) {
-            allowed?;
-        }
-        self.device.check(self.objects, at, value)?;
-        if let Some(entry) = self.objects.entry_mut(at) {
-            entry.value.clear();
-            entry.value.extend_from_slice(value);
-        }
-        let (device, mut context) = self.context();
-        device.written(&mut context, at);
-        self.changed.push(at);
-        Ok(())
-    }
-}
-
-impl<D: Device> Access for Serving<'_, D> {
-    fn read(&mut self, at: Address, offset: u32, out: &mut [u8]) -> Result<(usize, Total), AbortCode> {
-        if offset == 0 {
-            let (device, mut context) = self.context();
-            device.update(&mut context);
-        }
-        let entry = self.objects.entry(at).ok_or_else(|| self.objects.missing(at))?;
-        if !entry.rights.read {
-            return Err(AbortCode::WRITE_ONLY);
-        }
-        Ok(read_slice(&entry.value, offset, out))
-    }
-
-    fn begin_write(&mut self, at: Address, size: Option<u32>) -> Result<(), AbortCode> {
-        self.may_write(at)?;
-        self.download.clear();
-        let longest = self.longest(at);
-        if size.is_some_and(|size| size as usize > longest) { Err(AbortCode::TOO_LONG) } else { Ok(()) }
-    }
-
-    fn write(&mut self, at: Address, piece: &Piece<'_>) -> Result<(), AbortCode> {
-        if piece.is_whole() {
-            // Without indicated size the object knows how many of the bytes count.
-            let own = self.objects.entry(at).and_then(|entry| entry.data_type.size()).map(usize::from);
-            let len = own.filter(|_| piece.size.is_none()).unwrap_or(piece.data.len());
-            let data = piece.data.get(..len).unwrap_or(piece.data);
-            return self.store(at, data);
-        }
-        if piece.offset == 0 {
-            self.download.clear();
-        }
-        self.download.truncate(piece.offset as usize);
-        if self.download.len() + piece.data.len() > self.longest(at) {
-            return Err(AbortCode::TOO_LONG);
-        }
-        self.download.extend_from_slice(piece.data);
-        if piece.last {
-            let value = core::mem::take(self.download);
-            return self.store(at, &value);
-        }
-        Ok(())
-    }
-
-    fn abandon(&mut self, _at: Address) {
-        self.download.clear();
-    }
-}
-
-impl<D> Serving<'_, D> {
-    fn longest(&self, at: Address) -> usize {
-        let entry = self.objects.entry(at);
-        entry.map_or(0, |entry| entry.data_type.size().map_or(entry.longest, usize::from))
     }
 }
