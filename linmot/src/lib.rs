@@ -15,6 +15,7 @@ pub mod link;
 pub mod linrs;
 pub mod module;
 pub mod pvl;
+pub mod range;
 pub mod request;
 pub mod sdo;
 pub mod table;

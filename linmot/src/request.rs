@@ -29,6 +29,18 @@ pub enum Memory {
     Both,
 }
 
+impl Memory {
+    /// The values that a write changes.
+    #[must_use]
+    pub const fn values(self) -> &'static [Value] {
+        match self {
+            Self::Rom => &[Value::Rom],
+            Self::Ram => &[Value::Ram],
+            Self::Both => &[Value::Ram, Value::Rom],
+        }
+    }
+}
+
 /// Which UPIDs to list.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum List {

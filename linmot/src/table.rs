@@ -10,6 +10,8 @@ pub const ENTRY_SIZE: usize = 64;
 pub const ENTRY_WORDS: usize = ENTRY_SIZE / 4;
 /// Presence lists, 32 entries each (87h…8Eh).
 pub const LISTS: u8 = 8;
+/// Characters of a name, bytes 26h…35h.
+const NAME: usize = 16;
 /// Bytes 0…1 of every entry.
 pub const VERSION: u16 = 0xA701;
 /// Bytes 2…3 of an entry that none follows.
@@ -31,6 +33,9 @@ pub enum EntryError {
     /// Another number of bytes.
     #[error("{0} bytes, 64 expected")]
     Size(usize),
+    /// More characters than the field has, or one that ends it.
+    #[error("name of {0} characters, up to 16 expected, none of them 00h")]
+    Name(usize),
 }
 
 impl Entry {
@@ -118,13 +123,20 @@ impl Entry {
         field.split(|byte| *byte == 0).next().unwrap_or(&[])
     }
 
-    /// Sets the name; what is behind the 16th character is cut off.
-    pub fn set_name(&mut self, name: &[u8]) {
+    /// Sets the name.
+    ///
+    /// # Errors
+    /// [`EntryError::Name`] for more than 16 characters, or a 00h among them; the name is as it was.
+    pub fn set_name(&mut self, name: &[u8]) -> Result<(), EntryError> {
+        if name.len() > NAME || name.contains(&0) {
+            return Err(EntryError::Name(name.len()));
+        }
         let field = self.bytes.get_mut(0x26..0x36).unwrap_or(&mut []);
         field.fill(0);
         for (room, character) in field.iter_mut().zip(name) {
             *room = *character;
         }
+        Ok(())
     }
 
     fn get(&self, at: usize) -> u16 {
@@ -254,7 +266,9 @@ mod tests {
     #[test]
     fn fields_lie_where_the_manual_says() {
         let mut entry = Entry::new(0x0100, core::array::from_fn(|n| n as u8 + 1));
-        entry.set_name(b"Move out and back again");
+        entry.set_name(b"Move out and bac").unwrap();
+        assert_eq!(entry.set_name(b"Move out and back again"), Err(EntryError::Name(23)));
+        assert_eq!(entry.set_name(b"a\0b"), Err(EntryError::Name(3)));
         entry.link(Some(5));
         let bytes = entry.bytes();
         assert_eq!(bytes[..6], [0x01, 0xA7, 0x05, 0x00, 0x00, 0x01]);

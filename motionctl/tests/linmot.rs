@@ -73,7 +73,9 @@ fn a_drive_comes_back_from_its_files_over_every_carrier() {
         for row in ["03F3h, 78412058h", "03F4h, 4C207369h", "03F5h, 00746665h", "000F4240h"] {
             assert!(text.contains(row), "{row}");
         }
-        linmot.run(&["params", "defaults", "--layer", "os", "mc", "interface", "application"]).ends(0);
+        let defaults = ["params", "defaults", "--layer", "os", "mc", "interface", "application"];
+        linmot.run(&defaults).ends(2).says("--yes must say so");
+        linmot.run(&[&["--yes"], &defaults[..]].concat()).ends(0);
         linmot.run(&["curve", "delete-all"]).ends(0);
         linmot.run(&["curve", "save", "--yes"]).ends(0);
         linmot.run(&["table", "delete-all"]).ends(0);
@@ -129,8 +131,7 @@ fn refusals_are_named() {
         linmot
             .run(&["params", "set", "119Eh", "--", "32001"])
             .ends(4)
-            .says("range error")
-            .says("0 to 32000 expected");
+            .says("UPID 119Eh: 32001 is out of range, 0 to 32000 expected; nothing was written");
         linmot.run(&["params", "set", "3001h", "--", "101"]).ends(4).says("-100 to 100 expected");
         linmot.run(&["params", "set", "119Eh", "--", "x"]).ends(2).says("a number of 32 bits expected");
         linmot.run(&["curve", "get", "5", "-o", "X"]).ends(4).says("no such curve");
@@ -159,18 +160,19 @@ fn refusals_are_named() {
             edit(&bench.path("X.pvl"), from, to);
             linmot.run(&["--yes", "pvl", "restore", "X.pvl"]).ends(1).says(words);
         }
-        // A value that the drive refuses: what was written before it is said, and put right.
+        // A value that the drive would cut off.
         std::fs::copy(bench.path("B.pvl"), bench.path("X.pvl")).unwrap();
         edit(&bench.path("X.pvl"), "119Eh, 00001F40h", "119Eh, 00000001h");
-        edit(&bench.path("X.pvl"), "20A0h, 00000001h", "20A0h, 000000FFh");
+        edit(&bench.path("X.pvl"), "20A0h, 00000001h", "20A0h, 00000101h");
         linmot
             .run(&["--yes", "pvl", "restore", "X.pvl"])
-            .ends(4)
-            .says("incomplete: 32 parameters (1 of them written) and 0 curves are as in the file")
-            .says("correct what it refuses and restore again")
-            .says("UPID 20A0h")
-            .says("range error");
-        linmot.run(&["--yes", "pvl", "restore", "B.pvl"]).ends(0).says("1 of them written");
+            .ends(1)
+            .says("nothing was written: UPID 20A0h is 257 in the file, out of range: 1 to 127 expected");
+        linmot.run(&["--dry-run", "pvl", "restore", "X.pvl"]).ends(1).says("out of range");
+        linmot.run(&["--yes", "pvl", "restore", "B.pvl"]).ends(0).says("0 of them written");
+        // A negative number extended by its sign is the same number.
+        edit(&bench.path("B.pvl"), "3001h, 000000FBh", "3001h, FFFFFFFBh");
+        linmot.run(&["pvl", "compare", "B.pvl"]).ends(0);
         // A curve of another size, which only deleting makes room for.
         linmot.run(&["curve", "delete-all"]).ends(0);
         linmot.run(&["curve", "add", "5", "C.csv"]).ends(0);
@@ -183,6 +185,77 @@ fn refusals_are_named() {
         drive.kill();
         let gone = linmot.run(&["--timeout", "0.2", "params", "get", "13A2h"]);
         assert!([3, 5].contains(&gone.0.status.code().unwrap()), "{}", gone.stderr());
+    }
+}
+
+#[test]
+fn a_value_is_written_whole_or_not_at_all() {
+    for (endpoint, carrier) in CARRIERS {
+        let bench = Bench::new();
+        let _drive = drive(&bench, endpoint);
+        let linmot = Linmot { bench: &bench, carrier };
+        let flash = std::fs::read(bench.path("FLASH")).unwrap();
+        for (value, shown) in [
+            ("99999", "99999"),
+            ("70000", "70000"),
+            ("-3", "-3"),
+            ("0x10000", "65536"),
+            ("FFFFFFFDh", "4294967293"),
+            ("4294967296", "4294967296"),
+        ] {
+            let words =
+                format!("UPID 13A2h: {shown} is out of range, 0 to 65535 expected; nothing was written");
+            for memory in [&[][..], &["--ram"], &["--rom"], &["--both"], &["--dry-run"]] {
+                let set = [&["params", "set", "13A2h"], memory, &["--", value]].concat();
+                let ran = linmot.run(&set).ends(4).says(&words);
+                assert!(!ran.stdout().contains("would write"), "{}", ran.stdout());
+            }
+        }
+        for (upid, value, range) in [
+            ("13A0h", "-32001", "-32000 to 32000"),
+            ("13A0h", "0x1FFFB", "-32000 to 32000"),
+            ("3001h", "-101", "-100 to 100"),
+            ("3001h", "0xFFFB", "-100 to 100"),
+            ("3000h", "2147483648", "-2147483648 to 2147483647"),
+            ("3002h", "-1", "0 to 4294967295"),
+            ("20A1h", "2", "0 to 1"),
+        ] {
+            linmot.run(&["params", "set", upid, "--", value]).ends(4).says(&format!("{range} expected"));
+        }
+        for value in ["0x+5", "1e3", "12h4", "123456789h", "99999999999999999999"] {
+            linmot.run(&["params", "set", "13A2h", "--", value]).ends(2).says("a number of 32 bits expected");
+        }
+        for (text, words) in [
+            ("123456789012345678901234567890123", "up to 32 characters expected, 33 found"),
+            ("\u{65E5}\u{672C}", "characters of Windows-1252 expected"),
+        ] {
+            linmot.run(&["params", "set", "03F2h", "--", text]).ends(2).says(words);
+        }
+        assert_eq!(std::fs::read(bench.path("FLASH")).unwrap(), flash, "{carrier:?}: something was written");
+
+        // Numbers of signed types are numbers, in and out.
+        for (upid, value) in [("13A0h", "-5"), ("13A0h", "0xFFFA"), ("13A0h", "FFFFFFF9h")] {
+            linmot.run(&["params", "set", upid, "--", value]).ends(0);
+        }
+        linmot
+            .run(&["params", "get", "13A0h"])
+            .ends(0)
+            .says("ROM -7 (0000FFF9h)  RAM -7")
+            .says("minimum -32000,");
+        let get = linmot.json(&["params", "get", "13A0h"]);
+        let fields =
+            ["ram", "rom", "minimum", "maximum", "default"].map(|key| get["parameters"][0][key].as_i64());
+        assert_eq!(fields, [-7, -7, -32_000, 32_000, 0].map(Some));
+        linmot.run(&["params", "set", "3002h", "--", "4294967295"]).ends(0).says("ROM 4294967295");
+        linmot.run(&["params", "set", "3001h", "--", "-100"]).ends(0).says("ROM -100 (0000009Ch)");
+        linmot
+            .run(&["--dry-run", "params", "set", "3001h", "--", "0xFB"])
+            .ends(0)
+            .says("would write -5 to 3001h");
+        linmot.run(&["params", "list", "--changed"]).ends(0).says("3001h  ROM -100 (0000009Ch)");
+        // Characters that 8 bits have.
+        linmot.run(&["params", "set", "03F2h", "--", "Achse für 1 €"]).ends(0).says("Achse für 1 €");
+        linmot.run(&["params", "set", "03F2h", "--", ""]).ends(0).says("03F2h  \"\"");
     }
 }
 

@@ -18,7 +18,7 @@ use linmot::module::{RPDO, TPDO};
 use linmot::pvl::Writer;
 use linmot::request::{Access as CurveAccess, List, Reply, Request, Value};
 use linmot::sdo::{self, Access, Answer};
-use linmot::upid::{Layer, TreeIdentity, Usage};
+use linmot::upid::{Layer, TreeIdentity, Upid, Usage};
 use motion_io::linmot::transfer::{Options, restore};
 use pdo::{Frame, NodeId};
 
@@ -354,9 +354,10 @@ fn a_smaller_file_is_near_the_bus_limit_too() {
     }
 }
 
-/// Answers like a drive of `tree` without curves, and keeps nothing.
+/// Answers like a drive of `tree` without curves, and keeps nothing but the last value written.
 struct Sink<'a> {
     tree: &'a [Parameter],
+    last: Option<(Upid, u32)>,
     list: usize,
     info: usize,
     data: usize,
@@ -385,7 +386,12 @@ impl Link for Sink<'_> {
             }
             Request::Read { upid, value: Value::Ram | Value::Rom } => {
                 let default = self.tree.iter().find(|p| p.upid == upid).map_or(0, |p| p.default);
-                Reply::with_value(Status::OK, upid.0, default)
+                let last = self.last.filter(|(last, _)| *last == upid).map(|(_, value)| value);
+                Reply::with_value(Status::OK, upid.0, last.unwrap_or(default))
+            }
+            Request::Write { upid, value, .. } => {
+                self.last = Some((upid, value));
+                Reply::with_value(Status::OK, upid.0, value)
             }
             Request::StartCurve { access: CurveAccess::Get, .. } => {
                 Reply::new(Status::DEFINED, [first, 0, 0])
@@ -405,7 +411,7 @@ impl Link for Sink<'_> {
 fn memory_does_not_grow_with_the_file() {
     let tree = generated(2000);
     let peak = |curves: u16, setpoints: u16| {
-        let mut sink = Sink { tree: &tree, list: 0, info: 0, data: 0 };
+        let mut sink = Sink { tree: &tree, last: None, list: 0, info: 0, data: 0 };
         let mut file = File::new(&tree, curves, setpoints);
         let before = HELD.get();
         PEAK.set(before);

@@ -35,6 +35,14 @@ impl Encoding {
         }
     }
 
+    /// The bytes of text in this encoding, without the mark; `None` if it does not have all its
+    /// characters.
+    #[must_use]
+    pub fn encode_exactly(self, text: &str) -> Option<Vec<u8>> {
+        let bytes = self.encode(text);
+        (self.decode(&bytes) == text).then_some(bytes)
+    }
+
     /// The text of bytes in this encoding, without the mark. In UTF-8 what is none becomes U+FFFD.
     #[must_use]
     pub fn decode(self, bytes: &[u8]) -> Cow<'_, str> {

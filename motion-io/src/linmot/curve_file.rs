@@ -183,10 +183,11 @@ impl Head<'_> {
         let mut info = build(id, "", length, setpoints)?;
         self.parsed("unit", "unit=0.1um", |value| matches!(value, "0.1um" | "raw").then_some(()))?;
         if let Some(name) = self.get("name") {
-            let bytes = Encoding::Windows1252.encode(&name);
-            if bytes.len() >= info.name.len() || name.contains(char::is_control) {
-                return Err(wrong(1, "a name of up to 21 characters", &name));
-            }
+            let bytes = Encoding::Windows1252.encode_exactly(&name);
+            let bytes =
+                bytes.filter(|bytes| bytes.len() < info.name.len() && !name.contains(char::is_control));
+            let bytes =
+                bytes.ok_or_else(|| wrong(1, "a name of up to 21 characters of Windows-1252", &name))?;
             info.name.iter_mut().zip(bytes).for_each(|(room, byte)| *room = byte);
         }
         let kind = self.parsed("type", "type=0x0003, type=0x0103 or type=cam", |value| match value {

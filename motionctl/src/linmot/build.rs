@@ -24,10 +24,10 @@ pub(super) fn run(out: &Output, global: &Global, arguments: &Build) -> Result<()
     let (length, cam, setpoints) = setpoints(arguments)?;
     let build = if cam { InfoBlock::cam } else { InfoBlock::position_over_time };
     let mut info = build(ANY_ID, "", length, arguments.setpoints).map_err(refused)?;
-    let name = Encoding::Windows1252.encode(&arguments.name);
-    if name.len() >= info.name.len() {
-        return Err(refused(CurveError::Name(name.len())));
-    }
+    let name = Encoding::Windows1252
+        .encode_exactly(&arguments.name)
+        .filter(|name| !arguments.name.contains(char::is_control) && name.len() < info.name.len())
+        .ok_or_else(|| Exit::usage("--name: up to 21 characters of Windows-1252 expected"))?;
     info.name.iter_mut().zip(name).for_each(|(room, byte)| *room = byte);
     let file = arguments.output.display().to_string();
     let fastest = fastest(&info, &setpoints);

@@ -113,7 +113,7 @@ pub(crate) enum Params {
         upid: Upid,
         #[command(flatten)]
         memory: Memory,
-        /// Raw value, decimal or hex (0x10, 10h); of a string its text
+        /// Decimal, or raw in hex (0x10, 10h); of a string its text
         #[arg(allow_hyphen_values = true)]
         value: String,
     },
@@ -430,22 +430,22 @@ pub(crate) struct SimLinmot {
     pub(crate) checksum: SumKind,
 }
 
-/// Hex with `h`, `0x` or a letter among its digits, decimal otherwise.
-pub(crate) fn number(text: &str) -> Option<u32> {
-    let hex =
-        text.strip_prefix("0x").or_else(|| text.strip_prefix("0X")).or_else(|| text.strip_suffix(['h', 'H']));
-    match hex {
-        Some(hex) => u32::from_str_radix(hex, 16).ok(),
-        None if text.starts_with(['-', '+']) => text.parse::<i32>().ok().map(|value| value as u32),
-        None => text.parse().ok(),
-    }
+/// The digits of a number that is written in hex, as 0x10 or 10h.
+pub(crate) fn hex(text: &str) -> Option<&str> {
+    let digits = text
+        .strip_prefix("0x")
+        .or_else(|| text.strip_prefix("0X"))
+        .or_else(|| text.strip_suffix(['h', 'H']))?;
+    Some(digits).filter(|digits| digits.bytes().all(|byte| byte.is_ascii_hexdigit()))
 }
 
 fn upid(text: &str) -> Result<Upid, String> {
-    let hex = || u32::from_str_radix(text, 16).ok().filter(|_| text.len() <= 4);
-    number(text)
-        .or_else(hex)
-        .and_then(|value| u16::try_from(value).ok())
-        .map(Upid)
-        .ok_or_else(|| "a UPID expected: 13A2h, 0x13A2, or decimal up to 65535".into())
+    let short = |digits: &str| u16::from_str_radix(digits, 16).ok();
+    let value = match hex(text) {
+        Some(digits) => short(digits),
+        None if text.bytes().all(|byte| byte.is_ascii_digit()) => text.parse().ok(),
+        None if text.bytes().all(|byte| byte.is_ascii_hexdigit()) => short(text),
+        None => None,
+    };
+    value.map(Upid).ok_or_else(|| "a UPID expected: 13A2h, 0x13A2, or decimal up to 65535".into())
 }

@@ -90,6 +90,7 @@ impl From<Fault<LinkError>> for Exit {
                 let words = hint(&request, reply.status);
                 Self::refused(format!("{}{words}", Fault::<LinkError>::Refused { request, reply }))
             }
+            Fault::ReadBack { .. } | Fault::TextReadBack { .. } => Self::check(fault.to_string()),
             other => Self::refused(other.to_string()),
         }
     }

@@ -1,8 +1,9 @@
 //! `motionctl linmot params`.
 
 use linmot::code::Status;
-use linmot::link::{Fault, LinkExt};
+use linmot::link::{Fault, Link, LinkExt};
 use linmot::pvl::Encoding;
+use linmot::range::Range;
 use linmot::request::{List, Memory, Request, Value};
 use linmot::upid::{Layer, Upid, Usage};
 use serde_json::{Value as Json, json};
@@ -24,6 +25,14 @@ struct Shown {
     rom: Option<u32>,
     ram: Option<u32>,
     text: Option<String>,
+    /// By which the raw values are numbers; read where it matters.
+    range: Option<Range>,
+}
+
+impl Shown {
+    fn number(&self, raw: u32) -> i64 {
+        self.range.map_or(raw.into(), |range| range.number(raw))
+    }
 }
 
 pub(super) fn run(out: &Output, global: &Global, command: &Params) -> Result<(), Exit> {
@@ -39,7 +48,7 @@ pub(super) fn run(out: &Output, global: &Global, command: &Params) -> Result<(),
 fn usage(link: &mut AnyLink, upid: Upid) -> Result<Usage, Exit> {
     link.ask(Request::StartList { list: List::All, from: upid })?;
     let request = Request::NextItem(List::All);
-    let reply = linmot::link::Link::call(link, &request)?;
+    let reply = link.call(&request)?;
     let [found, usage, _] = reply.words;
     if reply.status == Status::OK && found == upid.0 {
         return Ok(Usage(usage));
@@ -51,7 +60,7 @@ fn usage(link: &mut AnyLink, upid: Upid) -> Result<Usage, Exit> {
 }
 
 fn read(link: &mut AnyLink, upid: Upid, usage: Usage, memory: cli::Memory) -> Result<Shown, Exit> {
-    let mut shown = Shown { upid, usage, rom: None, ram: None, text: None };
+    let mut shown = Shown { upid, usage, rom: None, ram: None, text: None, range: None };
     if usage.is_opaque() {
         let mut bytes = [0; TEXT];
         let value = if memory.ram { Value::Ram } else { Value::Rom };
@@ -66,7 +75,15 @@ fn read(link: &mut AnyLink, upid: Upid, usage: Usage, memory: cli::Memory) -> Re
     if memory.ram || !memory.rom && usage.contains(Usage::RAM_READ) {
         shown.ram = Some(link.read(upid, Value::Ram)?);
     }
+    if [shown.rom, shown.ram].into_iter().flatten().any(may_be_negative) {
+        shown.range = Some(link.range(upid)?);
+    }
     Ok(shown)
+}
+
+/// Whether a raw value has the sign bit of a type as its highest: only then its range must be known.
+fn may_be_negative(raw: u32) -> bool {
+    matches!(raw.leading_zeros(), 0 | 16 | 24)
 }
 
 const BOTH: cli::Memory = cli::Memory { ram: false, rom: false, both: true };
@@ -93,18 +110,19 @@ fn list(out: &Output, global: &Global, drive: &Drive, changed: bool) -> Result<(
         bar.inc(1);
     }
     bar.finish_and_clear();
-    let json: Vec<Json> = list.iter().map(|shown| to_json(shown, None)).collect();
+    let json: Vec<Json> = list.iter().map(to_json).collect();
     out.document(json!({ "parameters": json }), || list.iter().for_each(print));
     Ok(())
 }
 
-fn to_json(shown: &Shown, range: Option<[u32; 3]>) -> Json {
+fn to_json(shown: &Shown) -> Json {
+    let number = |value: Option<u32>| value.map(|raw| shown.number(raw));
     let mut json = json!({
         "upid": shown.upid.0,
         "hex": shown.upid.to_string(),
         "layer": shown.upid.layer().map(Layer::name),
-        "ram": shown.ram,
-        "rom": shown.rom,
+        "ram": number(shown.ram),
+        "rom": number(shown.rom),
         "usage": shown.usage.0,
         "access": shown.usage.to_string(),
         "live": shown.usage.contains(Usage::LIVE),
@@ -112,18 +130,12 @@ fn to_json(shown: &Shown, range: Option<[u32; 3]>) -> Json {
     if let (Some(text), Some(json)) = (&shown.text, json.as_object_mut()) {
         json.insert("text".into(), json!(text));
     }
-    if let (Some([minimum, maximum, default]), Some(json)) = (range, json.as_object_mut()) {
-        json.extend([
-            ("minimum".to_owned(), json!(minimum)),
-            ("maximum".to_owned(), json!(maximum)),
-            ("default".to_owned(), json!(default)),
-        ]);
-    }
     json
 }
 
 fn print(shown: &Shown) {
-    let value = |value: Option<u32>| value.map_or("-".into(), |value| format!("{value} ({value:08X}h)"));
+    let value =
+        |value: Option<u32>| value.map_or("-".into(), |raw| format!("{} ({raw:08X}h)", shown.number(raw)));
     match &shown.text {
         Some(text) => println!("{}  {text:?}", shown.upid),
         None => {
@@ -135,19 +147,29 @@ fn print(shown: &Shown) {
 fn get(out: &Output, global: &Global, drive: &Drive, upid: Upid, memory: cli::Memory) -> Result<(), Exit> {
     let mut link = connect(global, drive)?;
     let usage = usage(&mut link, upid)?;
-    let shown = read(&mut link, upid, usage, memory)?;
-    let range = match shown.text {
-        Some(_) => None,
-        None => Some([
-            link.read(upid, Value::Minimum)?,
-            link.read(upid, Value::Maximum)?,
-            link.read(upid, Value::Default)?,
-        ]),
-    };
-    out.document(json!({ "parameters": [to_json(&shown, range)] }), || {
+    let mut shown = read(&mut link, upid, usage, memory)?;
+    let mut default = None;
+    if shown.text.is_none() {
+        shown.range = Some(link.range(upid)?);
+        default = Some(link.read(upid, Value::Default)?);
+    }
+    let mut json = to_json(&shown);
+    if let (Some(range), Some(default), Some(json)) = (shown.range, default, json.as_object_mut()) {
+        json.extend([
+            ("minimum".to_owned(), json!(range.minimum())),
+            ("maximum".to_owned(), json!(range.maximum())),
+            ("default".to_owned(), json!(range.number(default))),
+        ]);
+    }
+    out.document(json!({ "parameters": [json] }), || {
         print(&shown);
-        if let Some([minimum, maximum, default]) = range {
-            println!("minimum {minimum} ({minimum:08X}h), maximum {maximum} ({maximum:08X}h), default {default} ({default:08X}h)");
+        if let (Some(range), Some(default)) = (shown.range, default) {
+            println!(
+                "minimum {}, maximum {}, default {} ({default:08X}h)",
+                range.minimum(),
+                range.maximum(),
+                range.number(default)
+            );
         }
     });
     Ok(())
@@ -176,55 +198,102 @@ fn set(
         Memory::Rom => "ROM",
         Memory::Both => "RAM and ROM",
     };
-    if usage.is_opaque() {
-        let bytes = Encoding::Windows1252.encode(value);
-        if bytes.len() > TEXT {
-            return Err(Exit::usage(format!("{value:?}: up to {TEXT} characters expected")));
-        }
-        if !global.dry_run {
-            out.confirm_on_terminal(global.yes, &format!("Write {upid} in {name}?"))?;
-            link.write_text(upid, memory, &bytes)?;
-        }
+    let value = if usage.is_opaque() {
+        Wanted::Text(characters(value)?)
     } else {
-        let raw = cli::number(value).ok_or_else(|| {
-            Exit::usage(format!("{value:?}: a number of 32 bits expected, decimal or hex (0x10, 10h)"))
-        })?;
-        if !global.dry_run {
-            out.confirm_on_terminal(global.yes, &format!("Write {upid} in {name}?"))?;
-            if let Err(fault) = link.write(upid, memory, raw) {
-                let range = match &fault {
-                    Fault::Refused { reply, .. } if reply.status == Status::RANGE => range(&mut link, upid),
-                    _ => None,
-                };
-                let exit = Exit::from(fault);
-                return Err(match range {
-                    Some(range) => Exit { message: format!("{}; {range} expected", exit.message), ..exit },
-                    None => exit,
-                });
-            }
-        }
-    }
+        let value = number(value)?;
+        let range = link.range(upid).map_err(|fault| Exit::from(fault).context("nothing was written"))?;
+        Wanted::Number(raw(upid, value, &range)?, range)
+    };
+    let said = match &value {
+        Wanted::Text(bytes) => format!("{:?}", text(bytes)),
+        Wanted::Number(raw, range) => range.number(*raw).to_string(),
+    };
     if global.dry_run {
-        out.say(&format!("would write {value} to {upid} in {name}"));
+        out.say(&format!("would write {said} to {upid} in {name}"));
         return Ok(());
     }
+    out.confirm_on_terminal(global.yes, &format!("Write {said} to {upid} in {name}?"))?;
+    match value {
+        Wanted::Text(bytes) => {
+            link.write_text(upid, memory, &bytes)
+                .map_err(|fault| half_written(&mut link, upid, memory, fault))?;
+        }
+        Wanted::Number(value, range) => {
+            link.ask(Request::Write { memory, upid, value })?;
+            link.verify(upid, memory, value, &range).map_err(|fault| match fault {
+                Fault::ReadBack { .. } => Exit::check(fault.to_string()),
+                other => Exit::from(other).context("it was written, but could not be read back"),
+            })?;
+        }
+    }
     let shown = read(&mut link, upid, usage, BOTH)?;
-    out.document(json!({ "parameters": [to_json(&shown, None)] }), || print(&shown));
+    out.document(json!({ "parameters": [to_json(&shown)] }), || print(&shown));
     Ok(())
 }
 
-/// Minimum and maximum, as far as the drive tells. Of a signed type the minimum is the greater of the raw
-/// values, as wide as its type.
-fn range(link: &mut AnyLink, upid: Upid) -> Option<String> {
-    let minimum = link.read(upid, Value::Minimum).ok()?;
-    let maximum = link.read(upid, Value::Maximum).ok()?;
-    let signed = match minimum {
-        _ if minimum <= maximum => i64::from(minimum),
-        0..=0xFF => i64::from(minimum as u8 as i8),
-        0x100..=0xFFFF => i64::from(minimum as u16 as i16),
-        _ => i64::from(minimum as i32),
+/// What shall be written.
+enum Wanted {
+    Text(Vec<u8>),
+    Number(u32, Range),
+}
+
+/// The characters of a string parameter.
+fn characters(value: &str) -> Result<Vec<u8>, Exit> {
+    let wrong = |what: &str| Exit::usage(format!("{value:?}: {what}"));
+    let bytes = Encoding::Windows1252
+        .encode_exactly(value)
+        .ok_or_else(|| wrong("characters of Windows-1252 expected, others cannot be kept"))?;
+    if bytes.len() > TEXT {
+        return Err(wrong(&format!("up to {TEXT} characters expected, {} found", bytes.len())));
+    }
+    Ok(bytes)
+}
+
+/// A number as it was typed: hex stands for the raw value.
+enum Typed {
+    Raw(u32),
+    Decimal(i64),
+}
+
+fn number(value: &str) -> Result<Typed, Exit> {
+    let typed = match cli::hex(value) {
+        Some(digits) => u32::from_str_radix(digits, 16).ok().map(Typed::Raw),
+        None => value.parse().ok().map(Typed::Decimal),
     };
-    Some(format!("{signed} to {maximum}"))
+    typed.ok_or_else(|| {
+        Exit::usage(format!("{value:?}: a number of 32 bits expected, decimal or hex (0x10, 10h)"))
+    })
+}
+
+/// The raw value, which the drive will keep as it is.
+fn raw(upid: Upid, value: Typed, range: &Range) -> Result<u32, Exit> {
+    let (raw, value) = match value {
+        Typed::Raw(raw) => (Some(raw).filter(|raw| range.contains(*raw)), range.number(raw)),
+        Typed::Decimal(number) => (range.raw(number), number),
+    };
+    let fault = Fault::<motion_io::linmot::LinkError>::Range { upid, value, range: *range };
+    raw.ok_or_else(|| Exit::refused(format!("{fault}; nothing was written")))
+}
+
+/// A string is written in pieces: what it is now.
+fn half_written(
+    link: &mut AnyLink,
+    upid: Upid,
+    memory: Memory,
+    fault: Fault<motion_io::linmot::LinkError>,
+) -> Exit {
+    let mut now = String::new();
+    for (value, name) in memory.values().iter().map(|v| (*v, if *v == Value::Ram { "RAM" } else { "ROM" })) {
+        let mut bytes = [0; TEXT];
+        match link.read_text(upid, value, &mut bytes) {
+            Ok(len) => {
+                now += &format!("its {name} value is {:?} now; ", text(bytes.get(..len).unwrap_or(&[])))
+            }
+            Err(_) => now += &format!("its {name} value may be written in part; "),
+        }
+    }
+    Exit::from(fault).context(now.trim_end_matches("; "))
 }
 
 fn defaults(out: &Output, global: &Global, drive: &Drive, layers: &[LayerName]) -> Result<(), Exit> {
@@ -240,11 +309,16 @@ fn defaults(out: &Output, global: &Global, drive: &Drive, layers: &[LayerName]) 
         out.say(&format!("would set the ROM values of {} to their defaults", names.join(", ")));
         return Ok(());
     }
-    let question = format!("Set the ROM values of {} to their defaults?", names.join(", "));
-    out.confirm_on_terminal(global.yes, &question)?;
+    out.confirm(global.yes, &format!("Set the ROM values of {} to their defaults?", names.join(", ")))?;
     let mut link = connect(global, drive)?;
-    for layer in layers {
-        link.ask(Request::Defaults(layer))?;
+    for (done, layer) in layers.iter().enumerate() {
+        link.ask(Request::Defaults(*layer)).map_err(|fault| {
+            let exit = Exit::from(fault);
+            match names.get(..done) {
+                None | Some([]) => exit,
+                Some(done) => exit.context(&format!("{} at their defaults already", done.join(", "))),
+            }
+        })?;
     }
     out.document(json!({ "defaults": names }), || {
         println!("ROM values of {} are at their defaults; they act after a restart", names.join(", "));

@@ -112,7 +112,7 @@ fn restore(
                 | TransferError::Parameters(_)
                 | TransferError::CurveSize(_)
         );
-        let refused = matches!(error, TransferError::Drive(Fault::Refused { .. }));
+        let refused = matches!(&error, TransferError::Drive(fault) if !matches!(fault, Fault::Carrier(_)));
         let exit = failed(path, error);
         if before {
             return exit.context("nothing was written");
@@ -164,10 +164,15 @@ fn compare(out: &Output, global: &Global, drive: &Drive, path: &Path) -> Result<
 
 fn describe(difference: &Difference) -> (Value, String) {
     match *difference {
-        Difference::Parameter { upid, file, drive } => (
-            json!({ "upid": upid.0, "file": file, "drive": drive }),
-            format!("{upid}: {file:08X}h in the file, {drive:08X}h in the drive"),
-        ),
+        Difference::Parameter { upid, file, drive, range } => {
+            let [file_number, drive_number] = [file, drive].map(|raw| range.number(raw));
+            (
+                json!({ "upid": upid.0, "file": file_number, "drive": drive_number }),
+                format!(
+                    "{upid}: {file_number} ({file:08X}h) in the file, {drive_number} ({drive:08X}h) in the drive"
+                ),
+            )
+        }
         Difference::Missing(upid) => {
             (json!({ "upid": upid.0, "drive": null }), format!("{upid}: unknown to the drive"))
         }

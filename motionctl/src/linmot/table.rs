@@ -87,9 +87,12 @@ fn hex(bytes: &[u8]) -> String {
 
 fn parse(raw: &str) -> Result<Entry, String> {
     let digits: String = raw.chars().filter(|c| !c.is_whitespace()).collect();
+    if let Some(other) = digits.chars().find(|c| !c.is_ascii_hexdigit()) {
+        return Err(format!("hex digits expected, {other:?} found"));
+    }
     let bytes: Option<Vec<u8>> =
         (0..digits.len()).step_by(2).map(|at| u8::from_str_radix(digits.get(at..at + 2)?, 16).ok()).collect();
-    let bytes = bytes.ok_or("hex digits in pairs expected")?;
+    let bytes = bytes.ok_or_else(|| format!("hex digits in pairs expected, {} found", digits.len()))?;
     Entry::parse(&bytes).map_err(|error| error.to_string())
 }
 
@@ -124,11 +127,17 @@ fn set(out: &Output, global: &Global, drive: &Drive, number: u16, raw: &str) -> 
         return Ok(());
     }
     let mut link = connect(global, drive)?;
-    link.write_entry(number, &entry)?;
-    if link.read_entry(number)? != entry {
+    write(&mut link, number, &entry)?;
+    show(out, &Entries::from([(number, entry)]));
+    Ok(())
+}
+
+/// An entry is as it was until its last word has come.
+fn write(link: &mut AnyLink, number: u16, entry: &Entry) -> Result<(), Exit> {
+    link.write_entry(number, entry)?;
+    if link.read_entry(number)? != *entry {
         return Err(Exit::check(format!("entry {number}: other bytes were read back than written")));
     }
-    show(out, &Entries::from([(number, entry)]));
     Ok(())
 }
 
@@ -242,7 +251,7 @@ fn restore(out: &Output, global: &Global, drive: &Drive, path: &Path) -> Result<
         }
         let bar = out.progress("writing", entries.len());
         for (number, entry) in &entries {
-            link.write_entry(*number, entry)?;
+            write(link, *number, entry)?;
             written += 1;
             bar.inc(1);
         }

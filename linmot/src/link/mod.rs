@@ -3,12 +3,17 @@
 //! All of it runs over a [`Link`], which carries one command and waits for its answer; motion-io has
 //! links over ports, and any carrier of your own is one method.
 
+mod fault;
+
 use crate::code::Status;
 use crate::curve::{INFO_SIZE, INFO_WORDS, InfoBlock};
 use crate::drive::LoggedError;
+use crate::range::Range;
 use crate::request::{Access, List, Memory, Reply, Request, Value};
 use crate::table::{ENTRY_SIZE, ENTRY_WORDS, Entry, LISTS, Presence};
 use crate::upid::{Layer, STRINGLETS, TreeIdentity, Upid, Usage};
+
+pub use fault::Fault;
 
 /// Carries one command to a drive and brings its answer.
 pub trait Link {
@@ -20,75 +25,6 @@ pub trait Link {
     /// # Errors
     /// No answer came.
     fn call(&mut self, request: &Request) -> Result<Reply, Self::Error>;
-}
-
-/// Why a procedure ended early.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum Fault<E> {
-    /// No answer came.
-    #[error(transparent)]
-    Carrier(E),
-    /// The drive refused a command.
-    #[error("{}: the drive answered {:02X}h, {}", subject(.request), .reply.status.0, .reply.status)]
-    Refused {
-        /// What was asked.
-        request: Request,
-        /// What came.
-        reply: Reply,
-    },
-    /// A block ended earlier or later than its size says.
-    #[error("{}: the block's end came after {done} words, {expected} expected", subject(.request))]
-    BlockLength {
-        /// The last command of it.
-        request: Request,
-        /// Words transferred.
-        done: usize,
-        /// Words that the size says.
-        expected: usize,
-    },
-    /// A size that no block has.
-    #[error("{}: size {size}, {expected} expected", subject(.request))]
-    Size {
-        /// The command that tells sizes.
-        request: Request,
-        /// What came.
-        size: u16,
-        /// What should have come.
-        expected: &'static str,
-    },
-    /// A command table entry that is none.
-    #[error("entry {entry}: {error}")]
-    Entry {
-        /// Its number.
-        entry: u16,
-        /// What is wrong.
-        error: crate::table::EntryError,
-    },
-}
-
-/// What a request is about, in words.
-fn subject(request: &Request) -> impl core::fmt::Display {
-    struct Subject(Request);
-    impl core::fmt::Display for Subject {
-        fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-            match self.0 {
-                Request::Read { upid, .. } | Request::Write { upid, .. } => {
-                    write!(f, "UPID {upid}: {}", self.0.command())
-                }
-                Request::StartCurve { curve, .. }
-                | Request::CurveInfo { curve, .. }
-                | Request::CurveData { curve, .. } => write!(f, "curve {curve}: {}", self.0.command()),
-                Request::DeleteEntry { entry }
-                | Request::WriteEntry { entry, .. }
-                | Request::WriteEntryData { entry, .. }
-                | Request::GetEntry { entry }
-                | Request::GetEntryData { entry } => write!(f, "entry {entry}: {}", self.0.command()),
-                _ => write!(f, "{}", self.0.command()),
-            }
-        }
-    }
-    Subject(*request)
 }
 
 /// One item of a UPID list.
@@ -119,12 +55,53 @@ pub trait LinkExt: Link {
         self.ask(Request::Read { value, upid }).map(|reply| reply.value())
     }
 
-    /// Writes a parameter, raw.
+    /// Minimum and maximum of a parameter.
     ///
     /// # Errors
     /// [`Fault::Carrier`], [`Fault::Refused`].
+    fn range(&mut self, upid: Upid) -> Result<Range, Fault<Self::Error>> {
+        Ok(Range::new(self.read(upid, Value::Minimum)?, self.read(upid, Value::Maximum)?))
+    }
+
+    /// Writes a parameter, raw: not before its range has been asked for, since a drive cuts off what
+    /// is too wide (manual B 2.5), and not without reading it back.
+    ///
+    /// # Errors
+    /// [`Fault::Range`] before anything was written, [`Fault::ReadBack`] afterwards;
+    /// [`Fault::Carrier`], [`Fault::Refused`].
     fn write(&mut self, upid: Upid, memory: Memory, value: u32) -> Result<(), Fault<Self::Error>> {
-        self.ask(Request::Write { memory, upid, value }).map(|_| ())
+        let range = self.range(upid)?;
+        if !range.contains(value) {
+            return Err(Fault::Range { upid, value: range.number(value), range });
+        }
+        self.ask(Request::Write { memory, upid, value })?;
+        self.verify(upid, memory, value, &range)
+    }
+
+    /// Reads back what was written, as far as it can be read.
+    ///
+    /// # Errors
+    /// [`Fault::ReadBack`] for any other value; [`Fault::Carrier`], [`Fault::Refused`].
+    fn verify(
+        &mut self,
+        upid: Upid,
+        memory: Memory,
+        value: u32,
+        range: &Range,
+    ) -> Result<(), Fault<Self::Error>> {
+        for from in memory.values() {
+            let found = match self.read(upid, *from) {
+                Ok(found) => range.number(found),
+                // It can be written only.
+                Err(Fault::Refused { reply, .. }) if reply.status == Status::USAGE => continue,
+                Err(fault) => return Err(fault),
+            };
+            let written = range.number(value);
+            if found != written {
+                return Err(Fault::ReadBack { upid, memory: *from, written, found });
+            }
+        }
+        Ok(())
     }
 
     /// Reads a list of UPIDs, one call of `each` an item. The next item is never asked for twice:
@@ -186,22 +163,36 @@ pub trait LinkExt: Link {
         Ok(text.iter().position(|byte| *byte == 0).unwrap_or(32))
     }
 
-    /// Writes a string by its own UPID, stringlet by stringlet, filled with 00h.
+    /// Writes a string by its own UPID, stringlet by stringlet, filled with 00h, and reads it back.
     ///
     /// # Errors
-    /// [`Fault::Carrier`], [`Fault::Refused`].
+    /// [`Fault::Text`] before anything was written; after [`Fault::Carrier`] and [`Fault::Refused`] the
+    /// string may be written in part; [`Fault::TextReadBack`].
     fn write_text(&mut self, upid: Upid, memory: Memory, text: &[u8]) -> Result<(), Fault<Self::Error>> {
+        if text.len() > 4 * usize::from(STRINGLETS) || text.contains(&0) || upid.stringlet(7).is_none() {
+            return Err(Fault::Text { upid, len: text.len() });
+        }
         for number in 0..STRINGLETS {
             let Some(stringlet) = upid.stringlet(number) else { break };
-            let raw = crate::upid::stringlet(text, number);
-            match self.write(stringlet, memory, raw) {
+            let value = crate::upid::stringlet(text, number);
+            match self.ask(Request::Write { memory, upid: stringlet, value }) {
                 // A shorter string ends here; characters that do not fit are refused.
                 Err(Fault::Refused { reply, .. })
-                    if number > 0 && raw == 0 && reply.status == Status::UPID =>
+                    if number > 0 && value == 0 && reply.status == Status::UPID =>
                 {
                     break;
                 }
-                other => other?,
+                other => other.map(|_| ())?,
+            }
+        }
+        for memory in memory.values() {
+            let mut found = [0; 32];
+            match self.read_text(upid, *memory, &mut found) {
+                Ok(len) if found.get(..len) == Some(text) => {}
+                Ok(_) => return Err(Fault::TextReadBack { upid, memory: *memory }),
+                // It can be written only.
+                Err(Fault::Refused { reply, .. }) if reply.status == Status::USAGE => {}
+                Err(fault) => return Err(fault),
             }
         }
         Ok(())
@@ -260,11 +251,14 @@ pub trait LinkExt: Link {
     /// each setpoint, so that a curve of any length needs no memory.
     ///
     /// # Errors
-    /// [`Fault::Carrier`], [`Fault::Refused`], [`Fault::BlockLength`]. A curve that was being added
-    /// is not there then; of one that was being modified the info block may be new and the setpoints
-    /// old.
+    /// [`Fault::Curve`] before anything was sent; [`Fault::Carrier`], [`Fault::Refused`],
+    /// [`Fault::BlockLength`]. A curve that was being added is not there then; of one that was being
+    /// modified the info block may be new and the setpoints old.
     fn start_curve(&mut self, access: Access, info: &InfoBlock) -> Result<(), Fault<Self::Error>> {
-        let (curve, data) = (info.id, info.setpoints.saturating_mul(info.setpoint_size));
+        let curve = info.id;
+        info.check().map_err(|error| Fault::Curve { curve, error })?;
+        // Checked: at most 16383 setpoints of 4 bytes.
+        let data = info.setpoints * info.setpoint_size;
         self.ask(Request::StartCurve { access, curve, info: INFO_SIZE, data })?;
         for (done, value) in (1..).zip(info.encode()) {
             self.block_word(Request::CurveInfo { access, curve, value }, done, INFO_WORDS)?;
