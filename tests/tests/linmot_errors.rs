@@ -222,6 +222,13 @@ impl Bench {
         self.world.lock().unwrap()
     }
 
+    /// Non-volatile memory, and how often it was written.
+    fn kept(&self) -> (Vec<u8>, u64) {
+        let mut world = self.world();
+        let drive = world.drive();
+        (drive.image(), drive.writes())
+    }
+
     /// The command is refused with this status, and the error names it and what it is about.
     #[track_caller]
     fn refuses(&mut self, request: Request, status: Status, words: &str) {
@@ -276,7 +283,7 @@ fn parameter_errors() {
 fn a_value_that_the_drive_would_cut_off_is_not_written() {
     for carrier in CARRIERS {
         let mut bench = Bench::new(carrier);
-        let before = (bench.world().drive().image(), bench.world().drive().writes());
+        let before = bench.kept();
         for memory in [Memory::Rom, Memory::Ram, Memory::Both] {
             for (upid, value, words) in [
                 (0x13A2, 99_999, "UPID 13A2h: 99999 is out of range, 0 to 65535 expected"),
@@ -293,7 +300,7 @@ fn a_value_that_the_drive_would_cut_off_is_not_written() {
                 assert_eq!(fault.to_string(), words);
             }
         }
-        let after = (bench.world().drive().image(), bench.world().drive().writes());
+        let after = bench.kept();
         assert_eq!(after, before, "{carrier:?}: something was written");
         assert_eq!(bench.link.read(Upid(0x13A2), Value::Ram).unwrap(), 10);
         // A negative number in either form.
@@ -462,7 +469,8 @@ fn a_lost_answer_is_made_up_for_where_that_is_safe() {
         // knows, and it is said.
         let writes = bench.world().drive().writes();
         bench.world().lost = 1;
-        let wrote = bench.link.write(Upid(0x13A2), Memory::Rom, 11);
+        let write = Request::Write { memory: Memory::Rom, upid: Upid(0x13A2), value: 11 };
+        let wrote = bench.link.ask(write);
         if carrier == Carrier::Pdo {
             wrote.unwrap();
         } else {
@@ -480,7 +488,11 @@ fn a_count_that_is_never_echoed_is_named() {
     bench.link.read(Upid(0x13A2), Value::Ram).unwrap();
     bench.world().lost = usize::MAX;
     let writes = bench.world().drive().writes();
-    let error = bench.link.write(Upid(0x13A2), Memory::Rom, 12).unwrap_err().to_string();
+    let error = bench
+        .link
+        .ask(Request::Write { memory: Memory::Rom, upid: Upid(0x13A2), value: 12 })
+        .unwrap_err()
+        .to_string();
     assert!(error.contains("no answer to write ROM value"), "{error}");
     // However often its image was repeated.
     assert_eq!(bench.world().drive().writes(), writes + 1);

@@ -288,7 +288,7 @@ fn half_written(
         let mut bytes = [0; TEXT];
         match link.read_text(upid, value, &mut bytes) {
             Ok(len) => {
-                now += &format!("its {name} value is {:?} now; ", text(bytes.get(..len).unwrap_or(&[])))
+                now += &format!("its {name} value is {:?} now; ", text(bytes.get(..len).unwrap_or(&[])));
             }
             Err(_) => now += &format!("its {name} value may be written in part; "),
         }
