@@ -2,7 +2,6 @@
 
 use core::time::Duration;
 use std::io;
-use std::time::Instant;
 
 use pdo::Frame;
 
@@ -64,7 +63,7 @@ const BATCH: usize = 32;
 /// An endpoint and the clock that its engine sees: time since the driver was made.
 pub struct Driver {
     port: Box<dyn CanPort>,
-    start: Instant,
+    start: Duration,
     /// Taken from the engine, not yet by the endpoint.
     held: Option<Frame>,
 }
@@ -79,13 +78,14 @@ impl Driver {
     /// Drives engines on `port`.
     #[must_use]
     pub fn new(port: Box<dyn CanPort>) -> Self {
-        Self { port, start: Instant::now(), held: None }
+        let start = port.now();
+        Self { port, start, held: None }
     }
 
     /// The engine's time.
     #[must_use]
     pub fn now(&self) -> Duration {
-        self.start.elapsed()
+        self.port.now().saturating_sub(self.start)
     }
 
     /// Sends what the engine has to send, then waits for frames until the engine's next timeout, at most
@@ -100,6 +100,20 @@ impl Driver {
         limit: Duration,
         mut observe: impl FnMut(Duration, Event, bool),
     ) -> io::Result<()> {
+        // What was sent may have ended something, which the caller wants to know before waiting.
+        let sent = self.send(engine, &mut observe)?;
+        let wait = if sent { Duration::ZERO } else { self.wait(engine, limit) };
+        self.receive(engine, wait, &mut observe)?;
+        self.handle_timeout(engine);
+        Ok(())
+    }
+
+    /// Sends what the engine has to send, as far as the endpoint takes it; whether there was anything.
+    pub(super) fn send(
+        &mut self,
+        engine: &mut dyn Engine,
+        observe: &mut dyn FnMut(Duration, Event, bool),
+    ) -> io::Result<bool> {
         let now = self.now();
         let mut sent = false;
         while let Some(frame) = self.held.take().or_else(|| engine.poll_transmit(now)) {
@@ -117,15 +131,26 @@ impl Driver {
                 Err(error) => return Err(error),
             }
         }
-        let mut until = engine.poll_timeout().map_or(limit, |at| at.min(limit));
+        Ok(sent)
+    }
+
+    /// How long there is nothing to do unless something comes in, at most until `limit`.
+    pub(super) fn wait(&self, engine: &dyn Engine, limit: Duration) -> Duration {
         let now = self.now();
-        if self.held.is_some() {
-            until = until.min(now.saturating_add(RETRY));
-        }
-        // What was sent may have ended something, which the caller wants to know before waiting.
-        let mut timeout = if sent { Duration::ZERO } else { until.saturating_sub(now) };
+        let until = engine.poll_timeout().map_or(limit, |at| at.min(limit));
+        let until = if self.held.is_some() { until.min(now.saturating_add(RETRY)) } else { until };
+        until.saturating_sub(now)
+    }
+
+    /// Waits up to `timeout` and takes what has come, at most [`BATCH`]; whether that was all.
+    pub(super) fn receive(
+        &mut self,
+        engine: &mut dyn Engine,
+        mut timeout: Duration,
+        observe: &mut dyn FnMut(Duration, Event, bool),
+    ) -> io::Result<bool> {
         for _ in 0..BATCH {
-            let Some(event) = self.port.receive(timeout)? else { break };
+            let Some(event) = self.port.receive(timeout)? else { return Ok(true) };
             let now = self.now();
             match &event {
                 Event::Frame(frame) => engine.handle_frame(now, frame),
@@ -134,11 +159,15 @@ impl Driver {
             observe(now, event, false);
             timeout = Duration::ZERO;
         }
+        Ok(false)
+    }
+
+    /// Tells the engine the time, if it is due.
+    pub(super) fn handle_timeout(&self, engine: &mut dyn Engine) {
         let now = self.now();
         if engine.poll_timeout().is_some_and(|at| at <= now) {
             engine.handle_timeout(now);
         }
-        Ok(())
     }
 
     /// Like [`turn`](Self::turn), telling only what the bus says.

@@ -7,6 +7,8 @@ mod slcan;
 mod socketcan;
 mod socketcand;
 mod stream;
+#[cfg(all(feature = "socketcan", feature = "tokio", target_os = "linux"))]
+mod tokio;
 #[cfg(feature = "virtual")]
 mod virtual_bus;
 
@@ -20,6 +22,8 @@ pub use drive::{Driver, Engine};
 #[cfg(feature = "virtual")]
 pub use socketcand::Server;
 pub use stream::Stream;
+#[cfg(all(feature = "socketcan", feature = "tokio", target_os = "linux"))]
+pub use tokio::AsyncDriver;
 #[cfg(feature = "virtual")]
 pub use virtual_bus::{VirtualBus, VirtualPort};
 
