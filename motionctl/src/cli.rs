@@ -119,7 +119,7 @@ pub(crate) enum Sim {
         /// CAN endpoint that is its CAN 2
         #[arg(long, value_name = "EP")]
         can2: Option<String>,
-        /// Parameter by number or name, set before the start; may be given several times
+        /// Parameter by number or name ("CAN Link, CAN 1=1"), set before the start; may be given several times
         #[arg(long, value_name = "KEY=VALUE")]
         set: Vec<String>,
         /// File for flash and retained values; absent: in memory
@@ -267,7 +267,7 @@ pub(crate) enum Params {
     Get {
         #[command(flatten)]
         line: Line,
-        /// Number or name: 642, "V max.@1", "V max.@Axis 1"
+        /// Number, or name as it is printed: 642, "V max., Axis 1"; "V max.@1", "V max.@Axis 1"
         #[arg(required = true)]
         keys: Vec<String>,
     },
@@ -275,7 +275,7 @@ pub(crate) enum Params {
     Set {
         #[command(flatten)]
         line: Line,
-        /// KEY VALUE [KEY VALUE…]
+        /// KEY VALUE [KEY VALUE…]; KEY as for get: 642, "V max., Axis 1", "V max.@1"
         #[arg(required = true, allow_negative_numbers = true)]
         pairs: Vec<String>,
         /// Save to flash afterwards

@@ -133,7 +133,8 @@ fn bad_values_and_names_leave_the_device_unchanged() {
     set(&["5", "7", "642", "-1"]).ends(2).says("-1 is out of range");
     set(&["654", "0.0005"]).ends(2).says("at most 3 digits");
     set(&["V mxa.", "1"]).ends(2).says("nearest: \"V max.\"");
-    set(&["V max.", "1"]).ends(2).says("names 6 parameters");
+    set(&["V max.", "1"]).ends(2).says("names 6 parameters").says("what stands behind its comma");
+    set(&["[642] V max., Axis 2", "1"]).ends(2).says("no parameter is called");
     set(&["50", "1"]).ends(2).says("there is no parameter [050]");
     set(&["642"]).ends(2).says("a value is missing");
     set(&["103", "Incremental"]).ends(2).says("cannot be selected here");
@@ -143,6 +144,16 @@ fn bad_values_and_names_leave_the_device_unchanged() {
         .says("Invalid number of actual value inputs")
         .says("old values were put back");
     bench.run(&["params", "compare", "--port", "LINE", "F.toml"]).ends(0);
+}
+
+#[test]
+fn names_are_accepted_as_they_are_printed() {
+    let bench = Bench::new();
+    let _controller = bench.controller(&[]);
+    let set = |key: &str, value: &str| bench.run(&["params", "set", "--port", "LINE", key, value]);
+    set("V max., Axis 1", "1000").ends(0).says("[642] V max., Axis 1");
+    set("[642] V max., Axis 1", "2000").ends(0).says("[642] V max., Axis 1");
+    bench.run(&["params", "get", "--port", "LINE", "CAN Link, CAN 1"]).ends(0).says("CAN Link, CAN 1");
 }
 
 #[test]

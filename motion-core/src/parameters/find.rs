@@ -16,7 +16,7 @@ pub enum FindError {
         index: u16,
     },
     /// The name stands for several parameters.
-    #[error("{key:?} names {} parameters: {}", .candidates.len(), list(.candidates))]
+    #[error("{key:?} names {} parameters: {}; a number, or a name with what stands behind its comma, expected", .candidates.len(), list(.candidates))]
     Ambiguous {
         /// What was asked for.
         key: String,
@@ -45,22 +45,36 @@ fn names(names: &[&str]) -> String {
 }
 
 /// The parameter that a person means: `642`, `[642]`, or a name, with its instance where there is
-/// more than one: `V max.@1`, `v max@axis 1`, `Node address@CAN 2 Object/PDO IN 1`. Case, blanks and
-/// points do not count. The name alone will do for a single parameter.
+/// more than one: `V max.@1`, `v max@axis 1`, `Node address@CAN 2 Object/PDO IN 1`; or what
+/// [`Entry`] displays, with its number or without: `[642] V max., Axis 1`. Case, blanks and points do
+/// not count. The name alone will do for a single parameter.
 ///
 /// # Errors
 /// [`FindError`] lists the candidates of an ambiguous name and the names nearest to an unknown one.
 pub fn find(key: &str) -> Result<Entry, FindError> {
     let key = key.trim();
-    let number = key.strip_prefix('[').and_then(|key| key.strip_suffix(']')).unwrap_or(key);
-    if let Ok(index) = number.parse::<u16>() {
-        return get(index).ok_or(FindError::Unused { index });
-    }
-    let (name, instance) = match key.rsplit_once('@') {
-        Some((name, instance)) => (plain(name), plain(instance)),
-        None => (plain(key), String::new()),
+    let (number, name) = match key.strip_prefix('[').and_then(|key| key.split_once(']')) {
+        Some((number, name)) => (number.trim(), name.trim()),
+        None => (key, ""),
     };
-    let mut candidates: Vec<Entry> = iter().filter(|entry| plain(entry.name()) == name).collect();
+    if let Ok(index) = number.parse::<u16>() {
+        let entry = get(index).ok_or(FindError::Unused { index })?;
+        return if name.is_empty() || plain(key) == plain(&alloc::format!("{entry}")) {
+            Ok(entry)
+        } else {
+            Err(FindError::Unknown { key: key.into(), nearest: alloc::vec![entry.name()] })
+        };
+    }
+    let called = |name: &str| {
+        let name = plain(name);
+        iter().filter(|entry| plain(entry.name()) == name).collect::<Vec<_>>()
+    };
+    // A comma may stand in a name as well.
+    let (name, instance) = match key.rsplit_once('@').or_else(|| key.rsplit_once(',')) {
+        Some((name, instance)) if !called(name).is_empty() => (plain(name), plain(instance)),
+        _ => (plain(key), String::new()),
+    };
+    let mut candidates = called(&name);
     if candidates.is_empty() {
         return Err(FindError::Unknown { key: key.into(), nearest: nearest(&name) });
     }
@@ -77,10 +91,7 @@ pub fn find(key: &str) -> Result<Entry, FindError> {
     }
     match candidates.as_slice() {
         [one] => Ok(*one),
-        [] => Err(FindError::Ambiguous {
-            key: key.into(),
-            candidates: iter().filter(|entry| plain(entry.name()) == name).collect(),
-        }),
+        [] => Err(FindError::Ambiguous { key: key.into(), candidates: called(&name) }),
         _ => Err(FindError::Ambiguous { key: key.into(), candidates }),
     }
 }
@@ -139,6 +150,26 @@ mod tests {
         assert_eq!(find("node address@can 2 object/pdo out 1").unwrap().index(), 346);
         assert_eq!(find("baud rate@com 2").unwrap().index(), 8);
         assert_eq!(find("50"), Err(FindError::Unused { index: 50 }));
+    }
+
+    #[test]
+    fn every_parameter_is_found_as_it_is_displayed() {
+        for entry in iter() {
+            let shown = entry.to_string();
+            assert_eq!(find(&shown).unwrap(), entry, "{shown}");
+            let name = shown.split_once("] ").unwrap().1;
+            match find(name) {
+                Ok(found) => assert_eq!(found, entry, "{name}"),
+                // Two parameters of the manual that share name and group: the number tells them apart.
+                Err(FindError::Ambiguous { candidates, .. }) => {
+                    assert!(candidates.contains(&entry), "{name}");
+                }
+                Err(error) => panic!("{name}: {error}"),
+            }
+        }
+        assert_eq!(find("CAN Link, CAN 1"), find("CAN Link@CAN 1"));
+        assert!(matches!(find("[642] V max., Axis 2"), Err(FindError::Unknown { .. })));
+        assert!(matches!(find("V mix., Axis 2"), Err(FindError::Unknown { .. })));
     }
 
     #[test]
