@@ -1,7 +1,7 @@
 //! [`Device`] to EDS and DCF text.
 
 use alloc::borrow::ToOwned;
-use alloc::collections::BTreeMap;
+use alloc::collections::{BTreeMap, BTreeSet};
 use alloc::format;
 use alloc::string::{String, ToString};
 use alloc::vec::Vec;
@@ -278,6 +278,8 @@ pub(crate) fn update(text: &str, before: &Device, after: &Device) -> String {
     let before = by_name(sections(before));
     let order: Vec<String> = sections(after).iter().map(|section| canonical(&section.name)).collect();
     let after = by_name(sections(after));
+    let whole = whole(&document, &before, &after);
+    let is_whole = |name: &str| owner(name).is_some_and(|(owner, _)| whole.contains(&owner));
     let mut place: BTreeMap<String, usize> = BTreeMap::new();
     for (at, section) in document.sections.iter().enumerate().filter(|(_, section)| section.line != 0) {
         place.entry(canonical(section.name)).or_insert(at);
@@ -290,7 +292,7 @@ pub(crate) fn update(text: &str, before: &Device, after: &Device) -> String {
         match (place.get(name), after.get(name)) {
             (Some(at), _) => anchor = *at,
             // The same canonical section stood nowhere before, so the file lacks it by the change.
-            (None, Some(section)) if before.get(name) != Some(section) => {
+            (None, Some(section)) if before.get(name) != Some(section) || is_whole(name) => {
                 added.entry(anchor).or_default().push(section);
             }
             _ => {}
@@ -302,8 +304,12 @@ pub(crate) fn update(text: &str, before: &Device, after: &Device) -> String {
         let name = canonical(section.name);
         let first = place.get(&name) == Some(&at);
         match (before.get(&name), after.get(&name)) {
+            // An empty section of the file is filled.
+            (None, Some(new)) if section.line != 0 => change(&mut out, section, None, new, first, end),
+            (_, Some(new)) if is_whole(&name) => change(&mut out, section, None, new, first, end),
+            (_, None) if is_whole(&name) => {}
             (Some(old), Some(new)) if old != new && section.line != 0 => {
-                change(&mut out, section, old, new, first, end);
+                change(&mut out, section, Some(old), new, first, end);
             }
             (Some(_), None) if section.line != 0 => {}
             _ => section.lines.iter().for_each(|line| out.push_str(line.raw)),
@@ -319,8 +325,59 @@ pub(crate) fn update(text: &str, before: &Device, after: &Device) -> String {
     out
 }
 
-fn change(out: &mut String, section: &Lines<'_>, old: &Section, new: &Section, first: bool, end: &str) {
-    let numbered = !matches!(
+/// The objects that change and whose lists say anything else than we would write there: a list holds for
+/// the object's other sections too, so that these are written whole.
+fn whole(
+    document: &Document<'_>,
+    before: &BTreeMap<String, Section>,
+    after: &BTreeMap<String, Section>,
+) -> BTreeSet<String> {
+    let mut changed = BTreeSet::new();
+    for name in before.keys().chain(after.keys()).filter(|name| before.get(*name) != after.get(*name)) {
+        changed.extend(owner(name).map(|(owner, _)| owner));
+    }
+    let mut lists: BTreeMap<String, Fields> = BTreeMap::new();
+    for section in document.sections.iter().filter(|section| section.line != 0) {
+        let Some((owner, true)) = owner(section.name) else { continue };
+        if changed.contains(&owner) {
+            let said = lists.entry(canonical(section.name)).or_default();
+            let entries = section.entries().filter(|(_, key, _)| !key.eq_ignore_ascii_case("NrOfEntries"));
+            entries.for_each(|(_, key, value)| _ = said.set(key, value));
+        }
+    }
+    let as_written = |name: &String, said: &Fields| {
+        let ours = before.get(name).map(|section| section.fields.iter()).into_iter().flatten();
+        let ours = ours.filter(|(key, _)| !key.eq_ignore_ascii_case("NrOfEntries"));
+        ours.map(|(key, value)| (key.to_owned(), value.to_owned())).collect::<BTreeMap<_, _>>()
+            == said.iter().map(|(key, value)| (key.to_owned(), value.to_owned())).collect()
+    };
+    lists.retain(|name, said| !as_written(name, said));
+    lists.keys().filter_map(|name| owner(name)).map(|(owner, _)| owner).collect()
+}
+
+/// The object that a section belongs to, and whether the section is a list of its sub-objects' values.
+fn owner(name: &str) -> Option<(String, bool)> {
+    let (owner, part) = match Name::parse(name) {
+        Name::Object(index, part) => (format!("{index:04X}"), part),
+        Name::Module(number, ModulePart::Fixed(index, part)) => (format!("M{number}Fixed{index:04X}"), part),
+        Name::Module(number, ModulePart::SubExt(index, part)) => {
+            (format!("M{number}SubExt{index:04X}"), part)
+        }
+        _ => return None,
+    };
+    Some((owner, matches!(part, Part::Names | Part::Values | Part::Denotations)))
+}
+
+/// A section with other entries; without the old ones, all are written anew.
+fn change(
+    out: &mut String,
+    section: &Lines<'_>,
+    old: Option<&Section>,
+    new: &Section,
+    first: bool,
+    end: &str,
+) {
+    let by_key = matches!(
         Name::parse(section.name),
         Name::FileInfo
             | Name::DeviceInfo
@@ -330,19 +387,21 @@ fn change(out: &mut String, section: &Lines<'_>, old: &Section, new: &Section, f
             | Name::Object(_, Part::Own | Part::Sub(_))
             | Name::Module(_, ModulePart::Info)
     );
+    let old = old.filter(|_| by_key);
     // Where entries are numbered, one change moves the others: only comments stay.
     let last_entry =
         section.lines.iter().rposition(|line| matches!(line.kind, LineKind::Entry { .. })).unwrap_or(0);
     for (at, line) in section.lines.iter().enumerate() {
         match line.kind {
-            LineKind::Entry { .. } if numbered => {}
-            LineKind::Entry { key, value } => match (old.fields.get(key), new.fields.get(key)) {
-                (was, Some(is)) if was != Some(is) => {
+            LineKind::Entry { key, value } => match (old.map(|old| old.fields.get(key)), new.fields.get(key))
+            {
+                (None, _) => {}
+                (Some(was), Some(is)) if was != Some(is) => {
                     let head = line.raw.split_once('=').map_or(key, |(head, _)| head);
                     let gap = if line.raw.contains("= ") && !value.is_empty() { " " } else { "" };
                     put_entry(out, head, &format!("{gap}{is}"), end);
                 }
-                (Some(_), None) => {}
+                (Some(Some(_)), None) => {}
                 _ => out.push_str(line.raw),
             },
             _ => out.push_str(line.raw),
@@ -353,7 +412,7 @@ fn change(out: &mut String, section: &Lines<'_>, old: &Section, new: &Section, f
             }
             for (key, value) in new.fields.iter() {
                 let there = section.entries().any(|(_, have, _)| have.eq_ignore_ascii_case(key));
-                if numbered || !there && old.fields.get(key) != Some(value) {
+                if old.is_none_or(|old| !there && old.fields.get(key) != Some(value)) {
                     put_entry(out, key, value, end);
                 }
             }
@@ -405,6 +464,39 @@ mod tests {
             .replace("NrOfEntries=1\n2=", "NrOfEntries=2\n1=0x60640020\n2=");
         assert_eq!(text, expected);
         assert_eq!(read(text.as_bytes()).unwrap().device, changed);
+    }
+
+    #[test]
+    fn entries_of_a_list_that_other_sections_rely_on_stay() {
+        // Sub-index 1 stands apart and has its denotation from the list; so has 0, which is described nowhere.
+        let dcf = "[1003]\nParameterName=Errors\nObjectType=8\nDataType=7\nAccessType=rw\nParameterValue=1\n\
+            CompactSubObj=2\n[1003sub1]\nParameterName=First\nDataType=7\nAccessType=ro\n; kept\n\
+            [1003sub2]\nParameterName=Errors\nDataType=7\nAccessType=rw\n\
+            [1003Denotation]\n0=zero\n1=one\n2=two\n9=none\n";
+        let reading = read(dcf.as_bytes()).unwrap();
+        let change = |edit: fn(&mut Entry)| {
+            for sub in 0..=2 {
+                let mut changed = reading.device.clone();
+                edit(changed.object_mut(0x1003).unwrap().entry_mut(sub).unwrap());
+                let text = update(dcf, &reading.device, &changed);
+                assert_eq!(read(text.as_bytes()).unwrap().device, changed, "{text}");
+                assert!(text.contains("; kept"), "{text}");
+            }
+        };
+        change(|entry| entry.value = Some("0x12".into()));
+        change(|entry| entry.denotation = Some("other".into()));
+        change(|entry| entry.denotation = None);
+    }
+
+    #[test]
+    fn an_empty_section_is_filled() {
+        let dcf = "[DeviceCommissioning]\n; kept\n[1000]\nParameterName=Type\nDataType=7\nAccessType=ro\n";
+        let reading = read(dcf.as_bytes()).unwrap();
+        let mut changed = reading.device.clone();
+        changed.commissioning.set("NodeID", "5");
+        let text = update(dcf, &reading.device, &changed);
+        assert_eq!(read(text.as_bytes()).unwrap().device, changed, "{text}");
+        assert!(text.contains("; kept"), "{text}");
     }
 
     #[test]
