@@ -11,15 +11,48 @@ use super::{Device as Behaviour, Node};
 #[must_use]
 pub fn device_file<D: Behaviour>(node: &Node<D>, name: &str) -> Device {
     let all = node.objects();
+    let pdos = |from: u16| {
+        all.iter().filter(|(at, _)| at.sub == 0 && (from..from + 512).contains(&at.index)).count().to_string()
+    };
+    let own = |key: &str, value: &str| (key.to_owned(), value.to_owned());
     let mut device = Device {
-        file_info: Fields::from_iter([("FileName", format!("{name}.eds")), ("EDSVersion", "4.0".into())]),
+        file_info: Fields::from_iter([
+            own("FileName", &format!("{name}.eds")),
+            own("FileVersion", "1"),
+            own("FileRevision", "0"),
+            own("EDSVersion", "4.0"),
+            own("Description", "Objects of a virtual node"),
+            // When the description was made, not the file: the same node gives the same file.
+            own("CreationTime", "12:00AM"),
+            own("CreationDate", "01-01-2026"),
+            own("CreatedBy", "device-sim"),
+            own("ModificationTime", "12:00AM"),
+            own("ModificationDate", "01-01-2026"),
+            own("ModifiedBy", "device-sim"),
+        ]),
         device_info: Fields::from_iter([
-            ("VendorName", "device-sim".to_owned()),
-            ("VendorNumber", format!("{:#X}", all.get(0x1018, 1))),
-            ("ProductName", name.to_owned()),
-            ("ProductNumber", format!("{:#X}", all.get(0x1018, 2))),
-            ("RevisionNumber", format!("{:#X}", all.get(0x1018, 3))),
-            ("LSS_Supported", "1".into()),
+            ("VendorName".to_owned(), "device-sim".to_owned()),
+            ("VendorNumber".to_owned(), format!("{:#X}", all.get(0x1018, 1))),
+            ("ProductName".to_owned(), name.to_owned()),
+            ("ProductNumber".to_owned(), format!("{:#X}", all.get(0x1018, 2))),
+            ("RevisionNumber".to_owned(), format!("{:#X}", all.get(0x1018, 3))),
+            own("OrderCode", ""),
+            own("BaudRate_10", "1"),
+            own("BaudRate_20", "1"),
+            own("BaudRate_50", "1"),
+            own("BaudRate_125", "1"),
+            own("BaudRate_250", "1"),
+            own("BaudRate_500", "1"),
+            own("BaudRate_800", "1"),
+            own("BaudRate_1000", "1"),
+            own("SimpleBootUpMaster", "0"),
+            own("SimpleBootUpSlave", "1"),
+            own("Granularity", "8"),
+            own("DynamicChannelsSupported", "0"),
+            own("GroupMessaging", "0"),
+            own("NrOfRXPDO", &pdos(0x1400)),
+            own("NrOfTXPDO", &pdos(0x1800)),
+            own("LSS_Supported", "1"),
         ]),
         ..Device::default()
     };

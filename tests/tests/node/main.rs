@@ -70,6 +70,17 @@ fn virtual_drive_passes() {
     assert_passes(&test(&mut bench, &config(&device, true), |_| {}).unwrap());
 }
 
+/// What we write, our own check has nothing to say about.
+#[test]
+fn the_device_file_of_a_node_is_clean() {
+    let files =
+        [device_file(&RemoteIo::node(None, 1, false), "I/O"), device_file(&Ld2000::node(None, 1), "SD03")];
+    for device in files {
+        let reading = eds::read(eds::write_eds(&device).as_bytes()).unwrap();
+        assert_eq!(eds::check(&reading), []);
+    }
+}
+
 /// A node made of a device file passes a test by this file.
 #[test]
 fn a_node_of_a_device_file_passes() {
