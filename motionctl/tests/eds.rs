@@ -25,6 +25,7 @@ fn bench() -> Bench {
 fn check_names_line_and_clause() {
     let bench = bench();
     let json = bench.run(&["--json", "eds", "check", "a.eds"]).ends(1).json();
+    assert_eq!(json["errors"], 2);
     assert_eq!(json["format"], "EDS");
     assert_eq!(json["objects"], 4);
     let odd = json["diagnostics"].as_array().unwrap().iter().find(|d| d["rule"] == "spelling").unwrap();
@@ -35,8 +36,13 @@ fn check_names_line_and_clause() {
         .run(&["eds", "check", "a.eds"])
         .ends(1)
         .says("a.eds:19: warning: AccessType=\"ro ; odd\" is taken as ro");
-    let lenient = bench.run(&["--json", "eds", "check", "--lenient", "a.eds"]).ends(1).json();
+    let lenient = bench.run(&["--json", "eds", "check", "--lenient", "a.eds"]).ends(0).json();
     assert_eq!(lenient["diagnostics"].as_array().unwrap().len(), 1, "{lenient}");
+
+    bench.run(&["eds", "check", "--lenient", "--strict", "a.eds"]).ends(1).says("0 errors, 1 warnings");
+    let broken = EDS.replace("DataType=6", "DataType=six");
+    std::fs::write(bench.path("broken.eds"), broken).unwrap();
+    bench.run(&["eds", "check", "broken.eds"]).ends(1).says("DataType is no number");
 
     std::fs::write(bench.path("b.eds"), "what is this\n").unwrap();
     bench.run(&["eds", "check", "b.eds"]).ends(1).says("no device description: no section of an object");
@@ -61,6 +67,9 @@ fn show_resolves_the_node_id() {
 fn convert_changes_what_it_is_told_and_nothing_else() {
     let bench = bench();
     bench.run(&["eds", "convert", "a.eds", "same.eds"]).ends(0);
+    bench.run(&["eds", "convert", "a.eds", "--output", "option.eds"]).ends(0);
+    assert_eq!(std::fs::read_to_string(bench.path("option.eds")).unwrap(), EDS);
+    bench.run(&["eds", "convert", "a.eds"]).ends(2);
     assert_eq!(std::fs::read_to_string(bench.path("same.eds")).unwrap(), EDS);
 
     let set =

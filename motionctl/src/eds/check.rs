@@ -8,7 +8,7 @@ use super::{bytes, counts, diagnostic_json, kind_word, read_bytes};
 use crate::exit::Exit;
 use crate::output::{Output, put};
 
-pub(super) fn run(out: &Output, input: &Input, lenient: bool) -> Result<(), Exit> {
+pub(super) fn run(out: &Output, input: &Input, lenient: bool, strict: bool) -> Result<(), Exit> {
     let name = input.file.display().to_string();
     let reading = match read_bytes(input, &bytes(&input.file)?) {
         Ok(reading) => reading,
@@ -39,14 +39,14 @@ pub(super) fn run(out: &Output, input: &Input, lenient: bool) -> Result<(), Exit
         let lines: String = diagnostics.iter().map(|diagnostic| line(&name, diagnostic)).collect();
         let kind = kind_word(&reading);
         let encoding = reading.source.encoding.name();
-        put(format!(
-            "{lines}{name}: {kind}, {encoding}, {objects} objects, {entries} entries, {errors} errors, {warnings} warnings\n"
-        ));
+        put(format!("{lines}{name}: {kind}, {encoding}, {objects} objects, {entries} entries\n"));
     });
-    if diagnostics.is_empty() {
+    let total = format!("{name}: {errors} errors, {warnings} warnings");
+    if errors == 0 && !(strict && warnings > 0) {
+        out.remark(total);
         return Ok(());
     }
-    Err(Exit::check(format!("{name}: {errors} errors, {warnings} warnings")))
+    Err(Exit::check(total))
 }
 
 /// As compilers say it, so that editors find the place.

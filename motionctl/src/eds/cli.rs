@@ -7,13 +7,16 @@ use clap::{Args, Subcommand, ValueEnum};
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Eds {
-    /// What is wrong with a file, by line and clause; status 1 if anything is
+    /// What is wrong with a file, by line and clause; status 1 with errors, not for warnings alone
     Check {
         #[command(flatten)]
         input: Input,
         /// Only what had to be guessed or passed over to read the file, not every violation of the standard
         #[arg(long)]
         lenient: bool,
+        /// Status 1 for warnings too
+        #[arg(long)]
+        strict: bool,
     },
     /// What a file says: the device and its objects
     Show {
@@ -35,7 +38,11 @@ pub(crate) enum Eds {
         #[command(flatten)]
         input: Input,
         /// File to write; `-` is standard output
-        output: PathBuf,
+        #[arg(required_unless_present = "to_file", conflicts_with = "to_file")]
+        output: Option<PathBuf>,
+        /// The same, as an option
+        #[arg(short, long = "output", value_name = "FILE")]
+        to_file: Option<PathBuf>,
         /// Absent: by the file's name
         #[arg(long, value_enum)]
         to: Option<Kind>,

@@ -16,13 +16,13 @@ use cli::{Eds, Input};
 
 pub(crate) fn run(out: &Output, dry_run: bool, command: &Eds) -> Result<(), Exit> {
     match command {
-        Eds::Check { input, lenient } => check::run(out, input, *lenient),
+        Eds::Check { input, lenient, strict } => check::run(out, input, *lenient, *strict),
         Eds::Show { input, objects, node, implied } => show::run(out, input, objects, *node, *implied),
-        Eds::Convert { input, output, to, node, bit_rate, values, concise, anew } => convert::run(
+        Eds::Convert { input, output, to_file, to, node, bit_rate, values, concise, anew } => convert::run(
             out,
             dry_run,
             input,
-            output,
+            output.as_deref().or(to_file.as_deref()).unwrap_or_else(|| std::path::Path::new("-")),
             *to,
             &convert::Changes {
                 node: *node,
