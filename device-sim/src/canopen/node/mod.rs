@@ -33,9 +33,9 @@ pub struct Settings {
 
 /// A virtual CANopen node.
 ///
-/// - Input: [`handle_frame`](can::Node::handle_frame), [`handle_timeout`](can::Node::handle_timeout),
-///   [`handle_bus`](can::Node::handle_bus).
-/// - Output: [`poll_transmit`](can::Node::poll_transmit), [`poll_timeout`](can::Node::poll_timeout).
+/// - Input: [`handle_frame`](crate::can::Node::handle_frame), [`handle_timeout`](crate::can::Node::handle_timeout),
+///   [`handle_bus`](crate::can::Node::handle_bus).
+/// - Output: [`poll_transmit`](crate::can::Node::poll_transmit), [`poll_timeout`](crate::can::Node::poll_timeout).
 ///
 /// It boots with the first call of `handle_timeout` or `poll_transmit`.
 pub struct Node<D> {
