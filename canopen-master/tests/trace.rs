@@ -380,3 +380,94 @@ fn a_copy_has_no_consequences() {
     assert!(matches!(script.hear("701#05"), Kind::GuardReply { .. }));
     assert_eq!(script.tracer.poll_event(), None);
 }
+
+/// What the first frames of a capture are from the middle of.
+#[test]
+fn a_transfer_that_began_before_the_capture_is_told_from_there_on() {
+    let late = |frames: &[&str]| -> Vec<_> {
+        let mut script = Script::new();
+        let ended = script.play(frames);
+        assert_eq!(script.finish(), []);
+        assert!(ended.iter().all(|transfer| transfer.late));
+        ended
+    };
+    let unnamed = Address::new(0, 0);
+    let uploaded = late(&[
+        "581#0044454647484950",
+        "601#7000000000000000",
+        "581#1B51520000000000",
+        "581#0053545556575859",
+    ]);
+    assert_eq!(uploaded.len(), 1, "the answer that comes again answers nothing");
+    assert_eq!(
+        told(&uploaded[0]),
+        (Direction::Upload, Mode::Segmented, unnamed, &b"DEFGHIPQR"[..], Outcome::Done, 3)
+    );
+    let answered = late(&["581#4100200102000000", "601#6000000000000000", "581#0B41420000000000"]);
+    assert_eq!(told(&answered[0]), (Direction::Upload, Mode::Segmented, STORE, &b"AB"[..], Outcome::Done, 3));
+    let downloaded = late(&[
+        "602#1031323334353637",
+        "582#3000000000000000",
+        "602#0B38390000000000",
+        "582#2000000000000000",
+    ]);
+    assert_eq!(
+        told(&downloaded[0]),
+        (Direction::Download, Mode::Segmented, unnamed, &b"123456789"[..], Outcome::Done, 4)
+    );
+    let given_up = late(&["581#0044454647484950", "601#8000200100000405"]);
+    assert_eq!(
+        told(&given_up[0]),
+        (
+            Direction::Upload,
+            Mode::Segmented,
+            STORE,
+            &b"DEFGHIP"[..],
+            Outcome::Aborted { by: Way::Request, code: AbortCode::TIMED_OUT },
+            2
+        )
+    );
+}
+
+/// Its segments look like whatever their numbers look like: 40h like the request of an upload, 60h like one
+/// for a segment.
+#[test]
+fn a_capture_that_begins_inside_a_block_misreads_no_segments() {
+    for first in [0x0A, 0x1E, 0x3F, 0x40, 0x41, 0x5E, 0x60, 0x7B] {
+        let mut script = Script::new();
+        let segment = |at: u8, last: u8| format!("601#{:02X}31323334353637", (first + at) | last);
+        let frames: Vec<_> = (0..4).map(|at| segment(at, if at == 3 { 0x80 } else { 0 })).collect();
+        let mut ended = script.play(&frames.iter().map(String::as_str).collect::<Vec<_>>());
+        let acknowledge = format!("581#A2{:02X}7F0000000000", first + 3);
+        ended.extend(script.play(&[&acknowledge, "601#C900000000000000", "581#A100000000000000"]));
+        let late: Vec<_> = ended.iter().filter(|transfer| transfer.late).collect();
+        assert_eq!(late.len(), 1, "from {first:02X}h: {ended:?}");
+        assert_eq!(
+            (late[0].direction, late[0].mode, late[0].outcome),
+            (Direction::Download, Mode::Block, Outcome::Done)
+        );
+        assert_eq!(ended.len(), 1, "from {first:02X}h: {ended:?}");
+        let again = script.play(&["601#40416000DEADBEEF", "581#4B41600018028FAF"]);
+        assert!(again.len() == 1 && !again[0].late);
+    }
+}
+
+#[test]
+fn what_answers_nothing_belongs_to_no_transfer() {
+    let mut script = Script::new();
+    let belongs = |kind| match kind {
+        Kind::SdoRequest(frame) | Kind::SdoResponse(frame) | Kind::SdoAbort(frame) => frame.belongs,
+        other => panic!("{other:?}"),
+    };
+    let heard = [
+        ("581#4B41600018020000", false),
+        ("581#8041600011000906", false),
+        ("601#4041600000000000", true),
+        ("581#8041600011000906", true),
+        ("581#8041600011000906", false),
+        ("581#0041424344454647", false),
+    ];
+    for (text, expected) in heard {
+        assert_eq!(belongs(script.hear(text)), expected, "{text}");
+    }
+}

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use motion_io::capture::{
-    Capture, Direction, Format, Frame, FrameKind, Item, Record, Time, WriteFormat, Writer, open,
+    Capture, Direction, Format, Frame, FrameKind, Item, Record, Time, Times, WriteFormat, Writer, open,
 };
 
 const DATA: FrameKind = FrameKind::Data;
@@ -335,7 +335,8 @@ fn sent_frames_of_cooked_captures_are_told_from_their_copies() {
     packet(4, 4, [3, 7, 0, 0], 5);
     packet(5, 4, [4, 7, 0, 0], 5); // sent, with no second copy
     packet(6, 0, [5, 7, 0, 0], 5);
-    packet(7, 4, [0, 0, 7, 6], 5); // a big-endian identifier, which can be read one way only
+    packet(7, 0, [0, 0, 1, 0x81], 5); // 181h big-endian; the identifiers before it were little-endian
+    packet(8, 4, [0, 0, 7, 6], 5); // a big-endian identifier, which can be read one way only
     let (_, frames, damage) = read(&file);
     assert_eq!(damage, Vec::<String>::new());
     let seen: Vec<_> = frames.iter().map(|(_, record)| (record.frame.id, record.loopback)).collect();
@@ -349,13 +350,14 @@ fn sent_frames_of_cooked_captures_are_told_from_their_copies() {
             (0x703, true),
             (0x704, false),
             (0x705, false),
+            (0x0101_0000, false),
             (0x706, false)
         ]
     );
     file.truncate(file.len() - 20);
     let (_, frames, damage) = read(&file);
-    assert_eq!(frames.len(), 7);
-    assert_eq!(damage, ["packet 8: the file ends inside a packet"]);
+    assert_eq!(frames.len(), 8);
+    assert_eq!(damage, ["packet 9: the file ends inside a packet"]);
 }
 
 /// Every file of the recorded data: what comes in comes out, as a frame or as a report.
@@ -405,4 +407,32 @@ fn packet_blocks(mut file: &[u8]) -> usize {
         file = &file[u32::from_le_bytes(rest) as usize..];
     }
     count
+}
+
+/// What the times of a capture are since.
+fn times(content: &str) -> Times {
+    let Capture::Can(mut reader) = open(content.as_bytes()).unwrap() else { panic!("{content}") };
+    while reader.next().unwrap().is_some() {}
+    reader.times()
+}
+
+#[test]
+fn differences_are_told_from_times() {
+    let screen = |times: &[&str]| -> String {
+        times.iter().map(|time| format!(" ({time})  can0  080   [0]\n")).collect()
+    };
+    for (text, expected) in [
+        // candump -td, -tz, -ta; an excerpt; one frame of another bus read late.
+        (screen(&["000.000000", "000.009000", "000.001000", "000.010000"]), Times::Deltas),
+        (screen(&["000.000000", "000.009000", "000.010000", "000.010000"]), Times::Absolute),
+        (screen(&["1436509052.249713", "1436509052.249714"]), Times::Absolute),
+        (screen(&["000.304418", "000.304952", "543.665902"]), Times::Absolute),
+        (screen(&["1.0", "1.1", "1.2", "1.3", "1.4", "1.39999", "1.5", "1.6", "1.7"]), Times::Absolute),
+        ("base hex  timestamps relative\n 0.5 1 80 Rx d 0\n".into(), Times::Deltas),
+        ("base hex  timestamps absolute\n 0.5 1 80 Rx d 0\n".into(), Times::Absolute),
+        ("\"Time (rel)\",\"Identifier (hex)\",\"Data (hex)\"\n\"0.5\",\"80\",\"\"\n".into(), Times::Deltas),
+        ("\"Time (abs)\",\"Identifier (hex)\",\"Data (hex)\"\n\"0.5\",\"80\",\"\"\n".into(), Times::Absolute),
+    ] {
+        assert_eq!(times(&text), expected, "{text}");
+    }
 }

@@ -273,3 +273,138 @@ fn the_readme_shows_a_real_story() {
     let story = String::from_utf8(Bench::new().run(&["decode", log]).0.stdout).unwrap();
     assert!(readme.contains(&story), "README.md lacks:\n{story}");
 }
+
+/// The story of a log.
+fn story(log: &str, more: &[&str]) -> String {
+    let bench = Bench::new();
+    std::fs::write(bench.path("log"), log).unwrap();
+    let mut arguments = vec!["decode", "log"];
+    arguments.extend(more);
+    bench.run(&arguments).ends(0).stdout()
+}
+
+#[track_caller]
+fn expect_lines(text: &str, lines: &[&str]) {
+    let told: Vec<&str> = text.lines().map(str::trim).collect();
+    assert_eq!(told, lines, "{text}");
+}
+
+#[test]
+fn an_abort_or_answer_without_its_request_is_told() {
+    let log = "(0.1) can0 581#4B41600037060000\n\
+               (0.2) can0 581#8018100511000906\n\
+               (0.3) can0 602#8000200100000405\n\
+               (0.4) can0 581#6040600000000000\n\
+               (0.5) can0 601#4041600000000000\n\
+               (0.6) can0 581#8018100511000906\n\
+               (0.7) can0 581#4B41600037060000\n\
+               (0.8) can0 581#0041424344454647\n\
+               (0.9) can0 581#FF41424344454647\n";
+    expect_lines(
+        &story(log, &[]),
+        &[
+            "0.100000  can0   node 1    read  6041h:00 status word = 0637h, operation enabled, target reached, \
+             answer to no request in the capture",
+            "0.200000  can0   node 1    ABORTS 1018h:05 identity 5, sub-index does not exist (06090011h): no transfer \
+             of it is open",
+            "0.300000  can0   node 2    2000h:01: the client ABORTS, SDO protocol timed out (05040000h): no transfer of it is open",
+            "0.400000  can0   node 1    write 6040h:00 control word is confirmed: answer to no request in the capture",
+            "0.600000  can0   node 1    ABORTS 1018h:05 identity 5, sub-index does not exist (06090011h): no transfer \
+             of it is open",
+            "0.700000  can0   node 1    read  6041h:00 status word = 0637h, operation enabled, target reached",
+            "0.800000  can0   node 1    SDO frame that fits no transfer: 00 41 42 43 44 45 46 47",
+            "",
+            "what repeated itself:",
+            "node 1 SDO frames that fit no transfer: 2 times, every 100.0 ms",
+            "",
+            "9 frames: 1 sdo-request, 5 sdo-response, 3 sdo-abort",
+        ],
+    );
+}
+
+#[test]
+fn a_transfer_that_began_before_the_capture_is_told_as_one() {
+    let log = "(0.1) can0 581#0044726976652053\n\
+               (0.2) can0 601#7000000000000000\n\
+               (0.3) can0 581#1944303300000000\n\
+               (0.4) can0 582#6000200100000000\n\
+               (0.5) can0 582#A203040000000000\n";
+    expect_lines(
+        &story(log, &[]),
+        &[
+            "0.300000  can0   node 1    read  an object that is not named = \"Drive SD03\"  [segmented, 10 bytes in \
+             200.0 ms], begun before the capture",
+            "0.400000  can0   node 2    write 2000h:01 is confirmed: answer to no request in the capture",
+            "0.500000  can0   node 2    write an object that is not named: unfinished, nothing  [block, 0 bytes], \
+             begun before the capture",
+            "",
+            "5 frames: 1 sdo-request, 4 sdo-response",
+        ],
+    );
+    // The contract of --json: an answer without its request is a frame object only.
+    let objects = objects(log.as_bytes(), &[]);
+    assert!(objects.iter().all(|object| object["kind"] != "sdo-transfer"), "{objects:?}");
+}
+
+#[test]
+fn times_since_the_frame_before_are_added_up() {
+    let log = " (000.000000)  can0  080   [0]\n (000.000200)  can0  601   [8]  40 41 60 00 00 00 00 00\n \
+               (000.000100)  can0  581   [8]  4B 41 60 00 37 06 00 00\n (000.009700)  can0  080   [0]\n \
+               (000.000050)  can0  601   [8]  40 41 60 00 00 00 00 00\n (000.009950)  can0  080   [0]\n";
+    expect_lines(
+        &story(log, &[]),
+        &[
+            "times of this capture are those since the frame before, added up here",
+            "0.000000  can0   SYNC      begins",
+            "0.000300  can0   node 1    read  6041h:00 status word = 0637h, operation enabled, target reached",
+            "0.010050  can0   node 1    read  6041h:00 status word: NO ANSWER",
+            "",
+            "what repeated itself:",
+            "SYNC: 3 times, every 10.0 ms",
+            "",
+            "6 frames: 3 sync, 2 sdo-request, 1 sdo-response",
+        ],
+    );
+    assert!(story(log, &["--times", "absolute"]).contains("0.000100  can0   node 1    read  6041h:00"));
+    // With --json times are the capture's own, and intervals are right.
+    let objects = objects(log.as_bytes(), &[]);
+    let times: Vec<_> = objects.iter().filter_map(|object| object.get("t")).collect();
+    assert_eq!(json!(times), json!([0.0, 0.0002, 0.0001, 0.0001, 0.0097, 0.00005, 0.00995, null]));
+    let intervals: Vec<_> = objects.iter().filter_map(|object| object.get("interval")).collect();
+    assert_eq!(json!(intervals), json!([0.01, 0.01]));
+}
+
+/// Packets of link type 113 in a pcap file, microseconds apart.
+fn cooked(packets: &[(u8, u32, &[u8])]) -> Vec<u8> {
+    let mut file = Vec::from([
+        0xD4, 0xC3, 0xB2, 0xA1, 2, 0, 4, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0xFF, 0xFF, 0, 0, 113, 0, 0, 0,
+    ]);
+    for (at, (kind, id, data)) in (0_u32..).zip(packets) {
+        let mut packet = vec![0, *kind, 0x01, 0x18, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0x0C];
+        packet.extend(id.to_be_bytes());
+        packet.extend([data.len() as u8, 0, 0, 0]);
+        packet.extend(*data);
+        let len = packet.len() as u32;
+        file.extend([1, at, len, len].iter().flat_map(|word| word.to_le_bytes()));
+        file.extend(packet);
+    }
+    file
+}
+
+#[test]
+fn loop_back_copies_are_counted_apart() {
+    let file =
+        cooked(&[(4, 0x181, &[1]), (1, 0x181, &[1]), (1, 0x701, &[5]), (4, 0x181, &[2]), (1, 0x181, &[2])]);
+    let bench = Bench::new();
+    std::fs::write(bench.path("sent.pcap"), &file).unwrap();
+    let text = bench.run(&["decode", "sent.pcap"]).ends(0).stdout();
+    assert_eq!(text.lines().last(), Some("3 frames: 2 pdo, 1 heartbeat; 2 loop-back copies"), "{text}");
+    assert!(text.contains("node 1 TPDO 1: 2 times"), "{text}");
+    // Every object counts where every frame gives one.
+    let objects = objects(&file, &[]);
+    let last = objects.last().unwrap();
+    assert!(
+        has(last, json!({ "frames": 5, "loopback": 2, "by_kind": { "pdo": 4, "heartbeat": 1 } })),
+        "{last}"
+    );
+}

@@ -309,8 +309,9 @@ impl BusState {
         };
         let already = events.len();
         let frame: SdoFrame = watch.handle(now, bus, way, data, events);
-        let learned =
-            events.range(already..).find(|transfer| transfer.is_done() && is_communication(transfer.at));
+        let learned = events
+            .range(already..)
+            .find(|transfer| transfer.is_done() && !transfer.late && is_communication(transfer.at));
         if let Some((at, value)) = learned.map(|transfer| (transfer.at, transfer.data.clone())) {
             self.learn(node, at, &value);
         }

@@ -2,7 +2,7 @@
 //! `   0.003 CANFD   1 Rx        123  Name  1 0 8 8 00 11 …`; `base hex` or `base dec`.
 
 use super::reader::Parsed;
-use super::record::{Buses, Direction, FrameKind, Record, Time};
+use super::record::{Buses, Direction, FrameKind, Record, Time, Times};
 use super::scan::{decimal, fixed, hex, nibble, word, words};
 
 /// Bit of the flags at the end of an FD line: the frame is in FD format.
@@ -12,11 +12,17 @@ const FLAG_REMOTE: u32 = 1 << 4;
 #[derive(Debug, Default)]
 pub(super) struct Asc {
     decimal: bool,
+    times: Times,
 }
 
 const MALFORMED: Parsed = Parsed::Damaged("channel, identifier, direction, d or r, length and data expected");
 
 impl Asc {
+    /// `timestamps relative` are those since the event before.
+    pub(super) const fn times(&self) -> Times {
+        self.times
+    }
+
     pub(super) fn line(&mut self, line: &[u8], record: &mut Record, buses: &mut Buses) -> Parsed {
         let Some((first, rest)) = word(line) else { return Parsed::Nothing };
         if !first.first().is_some_and(|&byte| byte.is_ascii_digit() || byte == b'-') {
@@ -43,6 +49,8 @@ impl Asc {
         match first {
             b"base" => {
                 self.decimal = words(rest).next() == Some(b"dec");
+                let relative = words(rest).any(|word| word == b"relative");
+                self.times = if relative { Times::Deltas } else { Times::Absolute };
                 Parsed::Nothing
             }
             b"date" | b"internal" | b"no" | b"Begin" | b"End" | b"begin" | b"end" | b"previous" => {

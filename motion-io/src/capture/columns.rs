@@ -4,7 +4,7 @@
 //! identifier, direction, type, length, data (`CAN1  67F Tx SD  8  2F 03 10 00 FF 00 00 00`).
 
 use super::reader::Parsed;
-use super::record::{Buses, Direction, FrameKind, MAX_DATA, Record, Time};
+use super::record::{Buses, Direction, FrameKind, MAX_DATA, Record, Time, Times};
 use super::scan::{clock, decimal, fixed, hex, hex_byte, word, words};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -24,11 +24,17 @@ enum Column {
 pub(super) struct Columns {
     delimiter: u8,
     columns: Vec<Column>,
+    times: Times,
 }
 
 const MALFORMED: Parsed = Parsed::Damaged("the columns that the header names expected");
 
 impl Columns {
+    /// `Time (rel)` is that since the line before.
+    pub(super) const fn times(&self) -> Times {
+        self.times
+    }
+
     pub(super) fn line(&mut self, line: &[u8], record: &mut Record, buses: &mut Buses) -> Parsed {
         let text = line.trim_ascii();
         if matches!(text, [] | [b'#', ..]) {
@@ -71,6 +77,9 @@ impl Columns {
             .collect();
         let names = |column| columns.contains(&column);
         if (names(Column::Id) || names(Column::IdDecimal)) && names(Column::Data) {
+            let relative = split(&lower, delimiter)
+                .any(|name| name.starts_with(b"time") && name.windows(3).any(|part| part == b"rel"));
+            self.times = if relative { Times::Deltas } else { Times::Absolute };
             self.delimiter = delimiter;
             self.columns = columns;
             return true;

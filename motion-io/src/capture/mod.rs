@@ -15,7 +15,8 @@
 //!
 //! [`Writer`] writes candump logs, `.asc`, `.trc` 2.1 and pcapng with link type 227.
 //!
-//! Times are the capture's own: an epoch time stays one, a difference to the line before stays one.
+//! Times are the capture's own: an epoch time stays one, a difference to the line before stays one
+//! ([`Reader::times`] tells which they are).
 
 mod asc;
 mod candump;
@@ -34,7 +35,7 @@ use std::io::{self, Read};
 
 pub use lb2::{Chunk, Lb2Reader};
 pub use reader::{Item, Reader};
-pub use record::{Bus, Damage, Direction, Frame, FrameKind, Place, Record, Time};
+pub use record::{Bus, Damage, Direction, Frame, FrameKind, Place, Record, Time, Times};
 pub use sniff::Format;
 pub use write::{WriteFormat, Writer};
 
@@ -72,11 +73,20 @@ pub enum Capture<R> {
 /// frames.
 pub fn open<R: Read>(source: R) -> Result<Capture<R>, CaptureError> {
     let mut input = input::Input::new(source);
-    let format = sniff::recognise(input.peek(sniff::LOOK_AHEAD)?)?;
-    open_as_input(input, format)
+    let start = input.peek(sniff::LOOK_AHEAD)?;
+    let format = sniff::recognise(start)?;
+    let deltas = format == Format::Candump && sniff::has_deltas(start);
+    let mut capture = open_as_input(input, format)?;
+    if let Capture::Can(reader) = &mut capture
+        && deltas
+    {
+        reader.set_times(Times::Deltas);
+    }
+    Ok(capture)
 }
 
-/// Reads a capture of which the format is known.
+/// Reads a capture of which the format is known. Nothing is looked at beforehand: candump's times are taken
+/// for absolute ones until [`Reader::set_times`] says otherwise.
 ///
 /// # Errors
 /// [`CaptureError`] if reading fails.

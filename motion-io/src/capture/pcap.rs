@@ -349,10 +349,16 @@ impl Pcap {
             u32_at(frame, 0, big)
                 .is_some_and(|id| id & EXTENDED != 0 || id & ERROR != 0 || id & 0x1FFF_F800 == 0)
         };
+        let standard = |big| u32_at(frame, 0, big).is_some_and(|id| id <= 0x7FF);
         match (plausible(true), plausible(false)) {
             (true, false) => *self.big_endian_ids.insert(true),
             (false, true) => *self.big_endian_ids.insert(false),
-            _ => self.big_endian_ids.unwrap_or(self.big_endian),
+            // Until a frame has told: of 181h and its reverse, which has the flag of 29 bits, the former.
+            _ => self.big_endian_ids.unwrap_or(match (standard(true), standard(false)) {
+                (true, false) => true,
+                (false, true) => false,
+                _ => self.big_endian,
+            }),
         }
     }
 }

@@ -7,7 +7,7 @@ use super::candump::Candump;
 use super::columns::Columns;
 use super::input::{Input, Line};
 use super::pcap::{Packet, Pcap};
-use super::record::{Bus, Buses, Damage, Place, Record, UNFIT};
+use super::record::{Bus, Buses, Damage, Place, Record, Times, UNFIT};
 use super::trc::Trc;
 use super::{CaptureError, Format};
 
@@ -83,6 +83,7 @@ pub struct Reader<R> {
     record: Record,
     buses: Buses,
     line: u64,
+    times: Option<Times>,
 }
 
 impl<R: Read> Reader<R> {
@@ -96,13 +97,37 @@ impl<R: Read> Reader<R> {
             }
             None => Parser::Pcap(Box::new(Pcap::open(&mut input)?)),
         };
-        Ok(Self { input, format, parser, record: Record::EMPTY, buses: Buses::default(), line: 0 })
+        Ok(Self {
+            input,
+            format,
+            parser,
+            record: Record::EMPTY,
+            buses: Buses::default(),
+            line: 0,
+            times: None,
+        })
     }
 
     /// The format that is read.
     #[must_use]
     pub const fn format(&self) -> Format {
         self.format
+    }
+
+    /// What the times are since, as far as the capture has told by now: a header may say so.
+    #[must_use]
+    pub const fn times(&self) -> Times {
+        match (self.times, &self.parser) {
+            (Some(times), _) => times,
+            (None, Parser::Text(TextParser::Asc(parser))) => parser.times(),
+            (None, Parser::Text(TextParser::Columns(parser))) => parser.times(),
+            (None, _) => Times::Absolute,
+        }
+    }
+
+    /// Says what the times are since.
+    pub const fn set_times(&mut self, times: Times) {
+        self.times = Some(times);
     }
 
     /// How the capture calls a bus of one of its records.

@@ -12,6 +12,16 @@ pub(super) const MAX_DATA: usize = 64;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Time(pub i64);
 
+/// What the times of a capture are since.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
+pub enum Times {
+    /// 1970, or the start of the recording: they do not decrease.
+    #[default]
+    Absolute,
+    /// The frame before.
+    Deltas,
+}
+
 impl Time {
     /// The time for engines, which know no time before zero.
     #[must_use]

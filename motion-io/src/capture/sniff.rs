@@ -4,7 +4,7 @@ use super::CaptureError;
 use super::lb2::hex_line;
 use super::pcap::is_pcap;
 use super::reader::{Parsed, TextParser};
-use super::record::{Buses, Record};
+use super::record::{Buses, Record, Time};
 
 /// How much of the content is looked at.
 pub(super) const LOOK_AHEAD: usize = 64 * 1024;
@@ -97,6 +97,26 @@ pub(super) fn recognise(start: &[u8]) -> Result<Format, CaptureError> {
         best = (hex, Format::Lb2Hex);
     }
     if best.0 > 0 { Ok(best.1) } else { Err(CaptureError::Unrecognised(super::reader::excerpt(first(text)))) }
+}
+
+/// Whether the times of a candump capture that begins so are differences (`candump -td`): nothing in a line
+/// says so, but times since one fixed point do not go back again and again. A few that do are frames of
+/// several buses that were not read in order.
+pub(super) fn has_deltas(start: &[u8]) -> bool {
+    const OFTEN: usize = 8;
+    let Some(mut parser) = TextParser::new(Format::Candump) else { return false };
+    let (mut record, mut buses) = (Record::EMPTY, Buses::default());
+    let (mut last, mut times, mut back) = (Time(i64::MIN), 0, 0);
+    for line in start.split(|&byte| byte == b'\n') {
+        if parser.line(line.trim_ascii_end(), &mut record, &mut buses) != Parsed::Frame {
+            continue;
+        }
+        let Some(time) = record.time else { continue };
+        back += usize::from(time < last);
+        times += 1;
+        last = time;
+    }
+    back * OFTEN > times
 }
 
 fn first(text: &[u8]) -> &[u8] {

@@ -1,7 +1,7 @@
 //! Arguments of `motionctl decode`.
 
 use clap::{Args, ValueEnum};
-use motion_io::capture::Format;
+use motion_io::capture::{Format, Times};
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct Decode {
@@ -21,6 +21,26 @@ pub(crate) struct Decode {
     /// Format, in place of the one that the content shows
     #[arg(long, value_enum)]
     pub(crate) format: Option<FormatName>,
+    /// What times of CAN captures are since, in place of what the content shows
+    #[arg(long, value_enum)]
+    pub(crate) times: Option<TimesName>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum TimesName {
+    /// 1970, or the start of the recording
+    Absolute,
+    /// The frame before
+    Deltas,
+}
+
+impl From<TimesName> for Times {
+    fn from(name: TimesName) -> Self {
+        match name {
+            TimesName::Absolute => Self::Absolute,
+            TimesName::Deltas => Self::Deltas,
+        }
+    }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

@@ -286,7 +286,7 @@ impl<W: Write> Teller<'_, W> {
         self.gaps_to(offset)?;
         let told = self.listener.telegram(offset, frame);
         self.end = offset + told.len;
-        self.totals.count(LB2);
+        self.totals.count(LB2, false);
         let time = self.times.at(offset);
         let name = name(told.function, told.sub);
         if self.json {

@@ -12,7 +12,9 @@ mod story;
 use std::io::{self, BufWriter, Read, Write};
 
 use canopen_master::trace::{Kind, Tracer, Transfer};
-use motion_io::capture::{Capture, CaptureError, Damage, FrameKind, Item, Reader, Record, open, open_as};
+use motion_io::capture::{
+    Capture, CaptureError, Damage, FrameKind, Item, Reader, Record, Time, Times, open, open_as,
+};
 
 use crate::exit::Exit;
 use crate::output::Output;
@@ -28,9 +30,14 @@ const BLOCK: usize = 256 * 1024;
 #[derive(Debug, Default)]
 pub(crate) struct Totals {
     frames: u64,
+    /// Of these: second copies of sent frames.
+    copies: u64,
     discarded_bytes: u64,
     damaged: u64,
+    /// Frames that are no copies.
     by_kind: [u64; NAMES.len()],
+    /// The copies.
+    copies_by_kind: [u64; NAMES.len()],
 }
 
 /// Names of what a frame can be, in the order of the summary.
@@ -80,16 +87,19 @@ const fn name_of(frame: FrameKind, kind: &Kind) -> usize {
 }
 
 impl Totals {
-    fn count(&mut self, name: usize) {
+    fn count(&mut self, name: usize, copy: bool) {
         self.frames += 1;
-        if let Some(count) = self.by_kind.get_mut(name) {
+        self.copies += u64::from(copy);
+        let by_kind = if copy { &mut self.copies_by_kind } else { &mut self.by_kind };
+        if let Some(count) = by_kind.get_mut(name) {
             *count += 1;
         }
     }
+}
 
-    fn kinds(&self) -> impl Iterator<Item = (&'static str, u64)> {
-        NAMES.iter().zip(self.by_kind).filter(|(_, count)| *count > 0).map(|(name, count)| (*name, count))
-    }
+/// Names with what was counted of them.
+fn named(counts: &[u64; NAMES.len()]) -> impl Iterator<Item = (&'static str, u64)> {
+    NAMES.into_iter().zip(*counts).filter(|(_, count)| *count > 0)
 }
 
 /// The number of a frame's bus; frames of a capture without buses are on one of their own.
@@ -99,10 +109,12 @@ fn number_of(record: &Record) -> u16 {
 
 /// Says what a frame is, to a machine or to a person.
 trait Teller {
-    /// One frame. FD frames and error reports are of an unknown kind.
-    fn frame(&mut self, record: &Record, bus: Option<&str>, kind: &Kind, tracer: &Tracer);
-    /// A transfer that has ended.
-    fn transfer(&mut self, transfer: &Transfer, bus: Option<&str>);
+    /// The times of the capture are differences. Before the first frame.
+    fn deltas(&mut self) {}
+    /// One frame. FD frames and error reports are of an unknown kind. `time` has differences added up.
+    fn frame(&mut self, record: &Record, time: Option<Time>, bus: Option<&str>, kind: &Kind, tracer: &Tracer);
+    /// A transfer that has ended. `given` is the time of its last frame as the capture has it.
+    fn transfer(&mut self, transfer: &Transfer, given: Option<Time>, bus: Option<&str>);
     /// What is written so far.
     fn text(&mut self) -> &mut Vec<u8>;
 }
@@ -173,7 +185,10 @@ fn decode_file(
     };
     match capture.map_err(failed)? {
         Capture::Lb2(reader) => lb2::decode(out, file, reader, totals, stdout),
-        Capture::Can(reader) => {
+        Capture::Can(mut reader) => {
+            if let Some(times) = args.times {
+                reader.set_times(times.into());
+            }
             let mut tracer = Tracer::new();
             tracer.set_can_link(args.can_link);
             names.teach(&mut tracer);
@@ -198,6 +213,7 @@ fn decode_can<R: Read>(
     stdout: &mut impl Write,
 ) -> Result<(), Stop> {
     let mut buses: Vec<Option<String>> = Vec::new();
+    let (mut deltas, mut sum) = (false, 0_i64);
     loop {
         match reader.next().map_err(|error| Exit::file(file, &error))? {
             None => break,
@@ -207,6 +223,9 @@ fn decode_can<R: Read>(
                 continue;
             }
             Some(Item::Frame(_)) => {}
+        }
+        if !core::mem::replace(&mut deltas, reader.times() == Times::Deltas) && deltas {
+            teller.deltas();
         }
         let record = reader.record();
         if let Some(bus) = record.bus
@@ -219,16 +238,27 @@ fn decode_can<R: Read>(
         }
         let name = |bus: u16| buses.get(usize::from(bus)).and_then(Option::as_deref);
         let bus = number_of(record);
-        let now = record.time.filter(|time| time.0 >= 0).map(motion_io::capture::Time::since_zero);
+        let time = match record.time {
+            Some(Time(since_the_one_before)) if deltas => {
+                sum = sum.saturating_add(since_the_one_before);
+                Some(Time(sum))
+            }
+            time => time,
+        };
+        let now = time.filter(|time| time.0 >= 0).map(Time::since_zero);
         let kind = match record.frame.classic() {
             Some(frame) if record.loopback => tracer.look(bus, frame),
             Some(frame) => tracer.handle_frame(now, bus, frame),
             None => Kind::Unknown,
         };
-        totals.count(name_of(record.frame.kind, &kind));
-        teller.frame(record, name(bus), &kind, tracer);
+        totals.count(name_of(record.frame.kind, &kind), record.loopback);
+        teller.frame(record, time, name(bus), &kind, tracer);
         while let Some(transfer) = tracer.poll_event() {
-            teller.transfer(&transfer, name(transfer.bus));
+            let given = match deltas {
+                true => record.time.filter(|_| transfer.ended == now),
+                false => ended(&transfer),
+            };
+            teller.transfer(&transfer, given, name(transfer.bus));
         }
         if teller.text().len() >= BLOCK {
             stdout.write_all(teller.text())?;
@@ -238,11 +268,16 @@ fn decode_can<R: Read>(
     tracer.finish();
     while let Some(transfer) = tracer.poll_event() {
         let bus = buses.get(usize::from(transfer.bus)).and_then(Option::as_deref);
-        teller.transfer(&transfer, bus);
+        teller.transfer(&transfer, ended(&transfer).filter(|_| !deltas), bus);
     }
     stdout.write_all(teller.text())?;
     teller.text().clear();
     Ok(())
+}
+
+/// Time of a transfer's last frame.
+fn ended(transfer: &Transfer) -> Option<Time> {
+    transfer.ended.and_then(|time| i64::try_from(time.as_nanos()).ok()).map(Time)
 }
 
 /// A line that gave no frame, on standard error.

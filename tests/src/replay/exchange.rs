@@ -86,6 +86,10 @@ impl Sorter {
             let end = messages.len() - usize::from(replaced);
             let begin = end.saturating_sub(transfer.frames as usize);
             recording.strays += begin;
+            if transfer.late {
+                recording.strays += messages.drain(..end).skip(begin).count();
+                continue;
+            }
             let of_transfer: Vec<_> = messages.drain(..end).skip(begin).collect();
             recording.exchanges.push(Exchange { transfer, messages: of_transfer });
         }

@@ -11,7 +11,7 @@ use canopen_master::trace::{Direction as TransferDirection, Kind, Mode, Outcome,
 use motion_io::capture::{FrameKind, Record, Time};
 
 use super::names::Names;
-use super::{Teller, Totals, number_of};
+use super::{Teller, Totals, named, number_of};
 use fields::{put_mapped, put_tail};
 use text::{Piece, key, put_hex, put_number, put_text, put_time, put_word};
 
@@ -117,7 +117,14 @@ impl<'a> Json<'a> {
 }
 
 impl Teller for Json<'_> {
-    fn frame(&mut self, record: &Record, bus: Option<&str>, kind: &Kind, tracer: &Tracer) {
+    fn frame(
+        &mut self,
+        record: &Record,
+        _time: Option<Time>,
+        bus: Option<&str>,
+        kind: &Kind,
+        tracer: &Tracer,
+    ) {
         let frame = &record.frame;
         self.put_start(record.time);
         self.put_head(record, bus);
@@ -144,7 +151,11 @@ impl Teller for Json<'_> {
         }
     }
 
-    fn transfer(&mut self, transfer: &Transfer, bus: Option<&str>) {
+    fn transfer(&mut self, transfer: &Transfer, given: Option<Time>, bus: Option<&str>) {
+        // Of an answer without its request there are only the frames.
+        if transfer.late {
+            return;
+        }
         self.out.extend_from_slice(b"{\"kind\":\"sdo-transfer\",\"bus\":");
         self.put_bus(bus);
         let out = &mut self.out;
@@ -205,8 +216,7 @@ impl Teller for Json<'_> {
             }
         }
         key!(out, "t");
-        let nanos = transfer.ended.and_then(|time| i64::try_from(time.as_nanos()).ok());
-        put_time(out, nanos.map(Time));
+        put_time(out, given);
         out.extend_from_slice(b"}\n");
     }
 
@@ -217,12 +227,16 @@ impl Teller for Json<'_> {
 
 /// The last object.
 pub(super) fn summary(totals: &Totals, out: &mut impl Write) -> io::Result<()> {
+    // Every frame object counts, copies too.
+    let mut counts = totals.by_kind;
+    counts.iter_mut().zip(totals.copies_by_kind).for_each(|(count, copies)| *count += copies);
     let by_kind: serde_json::Map<_, _> =
-        totals.kinds().map(|(name, count)| (name.into(), count.into())).collect();
+        named(&counts).map(|(name, count)| (name.into(), count.into())).collect();
     let summary = serde_json::json!({
         "kind": "summary",
         "schema_version": crate::output::SCHEMA_VERSION,
         "frames": totals.frames,
+        "loopback": totals.copies,
         "damaged": totals.damaged,
         "discarded_bytes": totals.discarded_bytes,
         "by_kind": by_kind,

@@ -4,21 +4,25 @@
 //! guarding, a value polled again and again) is told when it begins and when it changes, and counted
 //! at the end.
 
+mod repeats;
+mod sdo;
+mod words;
+
 use core::fmt::Write as _;
 use std::collections::BTreeMap;
-use std::io::{self, Write};
+use std::io::Write;
 
 use canopen_master::ds402::StatusWord;
-use canopen_master::lss;
 use canopen_master::nmt::State;
-use canopen_master::trace::{
-    Direction as TransferDirection, Kind, Lss, Mode, Outcome, PdoDirection, Tracer, Transfer, Way,
-};
+use canopen_master::trace::{Kind, Outcome, PdoDirection, Tracer, Transfer};
 use canopen_master::{Address, NodeId, ds402};
-use motion_io::capture::{FrameKind, Record, Time};
+use motion_io::capture::{Frame, FrameKind, Record, Time};
 
 use super::names::{Names, bytes};
-use super::{Teller, Totals, number_of};
+use super::{Teller, number_of};
+use repeats::{Count, Cycle};
+pub(super) use words::summary;
+use words::{date, lss_words};
 
 /// How many values of one object are told, unless its values are states.
 const VALUES: u32 = 4;
@@ -39,28 +43,6 @@ pub(super) struct Story<'a> {
     drives: BTreeMap<(u16, NodeId), ds402::State>,
     silent: BTreeMap<(u16, NodeId), u32>,
     last: Last,
-}
-
-/// Something that repeats itself.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Cycle {
-    Sync(u16),
-    Time(u16),
-    Pdo(u16, NodeId, PdoDirection, u16),
-    Channel(u16, u8),
-    Heartbeat(u16, NodeId),
-    Guarding(u16, NodeId),
-    Identifier(u16, u32, bool),
-}
-
-#[derive(Debug, Default)]
-struct Count {
-    number: u64,
-    first: Option<i64>,
-    last: Option<i64>,
-    /// Data of the frame before.
-    data: Vec<u8>,
-    changes: u64,
 }
 
 /// What has been told of an object.
@@ -125,28 +107,16 @@ impl<'a> Story<'a> {
         }
     }
 
-    /// Counts a frame of a cycle: whether it is the first, and whether its data are new.
-    fn cycle(&mut self, cycle: Cycle, time: Option<i64>, data: &[u8]) -> (bool, bool) {
-        let count = self.cycles.entry(cycle).or_default();
-        let first = count.number == 0;
-        let changed = first || count.data != data;
-        count.number += 1;
-        if first {
-            count.first = time;
-        }
-        count.last = time;
-        if changed {
-            count.data.clear();
-            count.data.extend_from_slice(data);
-            count.changes += u64::from(!first);
-        }
-        (first, changed)
-    }
-
-    fn pdo(&mut self, record: &Record, bus: Option<&str>, number: u16, kind: &Kind, tracer: &Tracer) {
+    fn pdo(
+        &mut self,
+        frame: &Frame,
+        time: Option<i64>,
+        bus: Option<&str>,
+        number: u16,
+        kind: &Kind,
+        tracer: &Tracer,
+    ) {
         let Kind::Pdo { node, direction, number: pdo } = *kind else { return };
-        let frame = &record.frame;
-        let time = record.time.map(|time| time.0);
         let name = if direction == PdoDirection::Transmit { "TPDO" } else { "RPDO" };
         if frame.kind == FrameKind::Remote {
             return self.say(time, bus, &who(node), &format!("{name} {pdo} asked for by a remote frame"));
@@ -210,16 +180,16 @@ impl<'a> Story<'a> {
 
     fn state(
         &mut self,
-        record: &Record,
+        frame: &Frame,
+        time: Option<i64>,
         bus: Option<&str>,
         node: NodeId,
         is: Option<State>,
         was: Option<State>,
     ) {
-        let time = record.time.map(|time| time.0);
         match (is, was) {
             (None, _) => {
-                let data = bytes(record.frame.data());
+                let data = bytes(frame.data());
                 self.say(time, bus, &who(node), &format!("shows a state that there is not: {data}"));
             }
             (Some(is), None) => self.say(time, bus, &who(node), &format!("is {is}")),
@@ -234,12 +204,11 @@ impl<'a> Story<'a> {
     }
 
     /// One line for every frame.
-    fn raw(&mut self, record: &Record, bus: Option<&str>, kind: &Kind) {
+    fn raw(&mut self, record: &Record, time: Option<i64>, bus: Option<&str>, kind: &Kind) {
         let name = super::NAMES[super::name_of(record.frame.kind, kind)];
         self.repeated();
         self.last.text.clear();
-        let time =
-            record.time.map(|time| Time(time.0 - self.start.unwrap_or(0)).to_string()).unwrap_or_default();
+        let time = time.map(|time| Time(time - self.start.unwrap_or(0)).to_string()).unwrap_or_default();
         let copy = if record.loopback { "  (copy)" } else { "" };
         let channel = match kind {
             Kind::CanLink { channel } => format!(" channel {channel}"),
@@ -248,77 +217,30 @@ impl<'a> Story<'a> {
         let bus = bus.unwrap_or("");
         let _ = writeln!(self.out, "{time:>12}  {bus:<6}   · {:?}  {name}{channel}{copy}", record.frame);
     }
-
-    /// The counts, when the capture has ended.
-    pub(super) fn end(&mut self, tracer: &Tracer) {
-        self.repeated();
-        if self.cycles.values().any(|count| count.number > 1) {
-            let _ = writeln!(self.out, "\nwhat repeated itself:");
-        }
-        let cycles = core::mem::take(&mut self.cycles);
-        for (cycle, count) in cycles.iter().filter(|(_, count)| count.number > 1) {
-            let (bus, what) = match *cycle {
-                Cycle::Sync(bus) => (bus, "SYNC".into()),
-                Cycle::Time(bus) => (bus, "TIME".into()),
-                Cycle::Pdo(bus, node, PdoDirection::Transmit, number) => {
-                    (bus, format!("node {node} TPDO {number}"))
-                }
-                Cycle::Pdo(bus, node, PdoDirection::Receive, number) => {
-                    (bus, format!("node {node} RPDO {number}"))
-                }
-                Cycle::Channel(bus, channel) => (bus, format!("CAN Link channel {channel}")),
-                Cycle::Heartbeat(bus, node) => {
-                    let state =
-                        tracer.state(bus, node).map(|state| format!(", at last {state}")).unwrap_or_default();
-                    (bus, format!("node {node} heartbeat{state}"))
-                }
-                Cycle::Guarding(bus, node) => (bus, format!("node {node} guarding")),
-                Cycle::Identifier(bus, id, extended) => {
-                    let width = if extended { 8 } else { 3 };
-                    (bus, format!("identifier {id:0width$X}h"))
-                }
-            };
-            let bus = match self.buses.get(usize::from(bus)) {
-                Some(name) if self.buses.len() > 1 => format!("{name} "),
-                _ => String::new(),
-            };
-            let period = match (count.first, count.last) {
-                (Some(first), Some(last)) if last > first => {
-                    let period = (last - first) as f64 / (count.number - 1) as f64 / 1e6;
-                    format!(", every {period:.1} ms")
-                }
-                _ => String::new(),
-            };
-            let carries = matches!(cycle, Cycle::Pdo(..) | Cycle::Channel(..) | Cycle::Identifier(..));
-            let changes = match count.changes {
-                _ if !carries => String::new(),
-                0 => ", always the same".into(),
-                1 => ", 1 change".into(),
-                changes => format!(", {changes} changes"),
-            };
-            let _ = writeln!(self.out, "  {bus}{what}: {} times{period}{changes}", count.number);
-        }
-        let again: u64 = self.objects.values().map(|told| told.again).sum();
-        if again > 0 {
-            let _ = writeln!(self.out, "  SDO transfers with no news: {again}");
-        }
-    }
 }
 
 fn who(node: NodeId) -> String {
     format!("node {node}")
 }
 
-fn in_ms(from: Option<core::time::Duration>, to: Option<core::time::Duration>) -> String {
-    match from.zip(to).and_then(|(from, to)| to.checked_sub(from)) {
-        Some(time) if !time.is_zero() => format!(" in {:.1} ms", time.as_secs_f64() * 1e3),
-        _ => String::new(),
-    }
-}
-
 impl Teller for Story<'_> {
-    fn frame(&mut self, record: &Record, bus: Option<&str>, kind: &Kind, tracer: &Tracer) {
-        let time = record.time.map(|time| time.0);
+    fn deltas(&mut self) {
+        let _ = writeln!(
+            self.out,
+            "{:>12}  times of this capture are those since the frame before, added up here",
+            ""
+        );
+    }
+
+    fn frame(
+        &mut self,
+        record: &Record,
+        time: Option<Time>,
+        bus: Option<&str>,
+        kind: &Kind,
+        tracer: &Tracer,
+    ) {
+        let time = time.map(|time| time.0);
         if self.start.is_none()
             && let Some(first) = time.filter(|time| *time >= EPOCH)
         {
@@ -333,7 +255,7 @@ impl Teller for Story<'_> {
             self.buses.push(name.to_owned());
         }
         if self.every_frame {
-            self.raw(record, bus, kind);
+            self.raw(record, time, bus, kind);
         }
         if record.loopback {
             return;
@@ -389,7 +311,7 @@ impl Teller for Story<'_> {
                 };
                 self.say(time, bus, &who(node), &format!("{what}{register}{rest}"));
             }
-            Kind::Pdo { .. } => self.pdo(record, bus, number, kind, tracer),
+            Kind::Pdo { .. } => self.pdo(frame, time, bus, number, kind, tracer),
             Kind::GuardRequest { node, unanswered } => {
                 let (first, _) = self.cycle(Cycle::Guarding(number, node), time, &[]);
                 if first {
@@ -410,11 +332,11 @@ impl Teller for Story<'_> {
                 if wrong_toggle {
                     self.say(time, bus, &who(node), "guard reply with the toggle bit of the one before");
                 }
-                self.state(record, bus, node, state, before);
+                self.state(frame, time, bus, node, state, before);
             }
             Kind::Heartbeat { node, state, before } => {
                 self.cycle(Cycle::Heartbeat(number, node), time, &[]);
-                self.state(record, bus, node, state, before);
+                self.state(frame, time, bus, node, state, before);
             }
             Kind::BootUp { node, before } => {
                 self.drives.remove(&(number, node));
@@ -437,9 +359,12 @@ impl Teller for Story<'_> {
                     self.say(time, bus, "CAN Link", &what);
                 }
             }
-            Kind::SdoRequest(_) | Kind::SdoResponse(_) => {}
-            // Aborts of transfers are told with them; others have no request in the capture.
-            Kind::SdoAbort(_) => {}
+            Kind::SdoRequest(sdo) | Kind::SdoResponse(sdo) | Kind::SdoAbort(sdo) => {
+                // The others are told as the transfers that they are part of.
+                if !sdo.belongs {
+                    self.stray(time, bus, number, &sdo, frame.data());
+                }
+            }
             _ => {
                 if self.cycle(Cycle::Identifier(number, frame.id, frame.extended), time, frame.data()).0 {
                     self.say(time, bus, "bus", &format!("identifier of no known service: {frame:?}"));
@@ -448,117 +373,11 @@ impl Teller for Story<'_> {
         }
     }
 
-    fn transfer(&mut self, transfer: &Transfer, bus: Option<&str>) {
-        let Transfer { node, at, .. } = *transfer;
-        let upload = transfer.direction == TransferDirection::Upload;
-        let news = transfer.is_done() && self.is_news(transfer.bus, node, at, &transfer.data);
-        let told = self.objects.entry((transfer.bus, node, at, upload)).or_default();
-        let same = told.outcome == Some(transfer.outcome) && told.data == transfer.data && told.values > 0;
-        let writes_state = !upload && matches!(at.index, ds402::CONTROL_WORD | ds402::MODE);
-        if !news && !writes_state && (same || told.values >= VALUES) {
-            told.again += 1;
-            return;
-        }
-        told.values += 1;
-        told.outcome = Some(transfer.outcome);
-        told.data.clone_from(&transfer.data);
-        let more = if told.values == VALUES && !news && !writes_state { " (and so on)" } else { "" };
-        let object = self.names.object(node, at);
-        let value = self.names.words(node, at, &transfer.data);
-        let verb = if upload { "read" } else { "write" };
-        let how = match transfer.mode {
-            Mode::Expedited => String::new(),
-            mode => {
-                let mode = if mode == Mode::Block { "block" } else { "segmented" };
-                format!("  [{mode}, {} bytes{}]", transfer.size, in_ms(transfer.began, transfer.ended))
-            }
-        };
-        let what = match transfer.outcome {
-            Outcome::Done => format!("{verb:<5} {object} = {value}{how}"),
-            Outcome::Aborted { by: Way::Response, code } if upload => {
-                format!("{verb:<5} {object}: REFUSED, {code}{how}")
-            }
-            Outcome::Aborted { by: Way::Response, code } => {
-                format!("{verb:<5} {object} = {value}: REFUSED, {code}{how}")
-            }
-            Outcome::Aborted { by: Way::Request, code } => {
-                format!("{verb:<5} {object}: the client gave up, {code}{how}")
-            }
-            Outcome::Incomplete if transfer.frames == 1 => format!("{verb:<5} {object}: NO ANSWER"),
-            Outcome::Incomplete => format!("{verb:<5} {object}: unfinished, {value}{how}"),
-        };
-        let time = transfer.ended.and_then(|time| i64::try_from(time.as_nanos()).ok());
-        self.say(time, bus, &who(node), &format!("{what}{more}"));
+    fn transfer(&mut self, transfer: &Transfer, _given: Option<Time>, bus: Option<&str>) {
+        self.tell(transfer, bus, if transfer.late { ", begun before the capture" } else { "" });
     }
 
     fn text(&mut self) -> &mut Vec<u8> {
         &mut self.out
     }
-}
-
-fn lss_words(message: &Lss, data: &[u8]) -> (&'static str, String) {
-    match message {
-        Lss::Request(Some(request)) => {
-            let what = match *request {
-                lss::Request::SwitchGlobal(mode) => format!("all to {mode:?}").to_lowercase(),
-                lss::Request::Select(part, value) => format!("select {part:?} {value:08X}h").to_lowercase(),
-                lss::Request::ConfigureNodeId(node) => format!("node ID is to be {node}"),
-                lss::Request::ConfigureBitTiming { table, index } => {
-                    let rate = lss::BitTiming::from_index(index)
-                        .filter(|_| table == 0)
-                        .and_then(lss::BitTiming::kbits);
-                    match rate {
-                        Some(rate) => format!("bit rate is to be {rate} kbit/s"),
-                        None => format!("bit rate is to be number {index} of table {table}"),
-                    }
-                }
-                lss::Request::ActivateBitTiming { delay_ms } => {
-                    format!("change the bit rate in {delay_ms} ms")
-                }
-                lss::Request::Store => "store node ID and bit rate".into(),
-                lss::Request::Inquire(part) => format!("say your {part:?}").to_lowercase(),
-                lss::Request::InquireNodeId => "say your node ID".into(),
-                lss::Request::IdentifyUnconfigured => "who has no node ID?".into(),
-                lss::Request::Fastscan { number, bit, part, .. } => {
-                    format!("fastscan {part:?} {number:08X}h from bit {bit}").to_lowercase()
-                }
-            };
-            ("LSS", format!("master: {what}"))
-        }
-        Lss::Response(Some(response)) => {
-            let what = match *response {
-                lss::Response::Selected => "selected".into(),
-                lss::Response::Done { result, .. } => result.to_string(),
-                lss::Response::Identity(part, value) => format!("{part:?} {value:08X}h").to_lowercase(),
-                lss::Response::NodeId(node) => format!("node ID {node}"),
-                lss::Response::Identified => "here, it matches".into(),
-                lss::Response::Unconfigured => "here, without node ID".into(),
-            };
-            ("LSS", format!("slave: {what}"))
-        }
-        Lss::Request(None) => ("LSS", format!("master: unknown command, {}", bytes(data))),
-        Lss::Response(None) => ("LSS", format!("slave: unknown command, {}", bytes(data))),
-    }
-}
-
-/// Nanoseconds since 1970 as date and time of day, UTC.
-fn date(nanos: i64) -> String {
-    let since = core::time::Duration::from_nanos(u64::try_from(nanos).unwrap_or(0));
-    humantime::format_rfc3339_millis(std::time::UNIX_EPOCH + since).to_string()
-}
-
-/// The last line.
-pub(super) fn summary(totals: &Totals, out: &mut impl Write) -> io::Result<()> {
-    let kinds: Vec<String> = totals.kinds().map(|(name, count)| format!("{count} {name}")).collect();
-    write!(out, "\n{} frames", totals.frames)?;
-    if !kinds.is_empty() {
-        write!(out, ": {}", kinds.join(", "))?;
-    }
-    if totals.damaged > 0 {
-        write!(out, "; {} lines gave no frame", totals.damaged)?;
-    }
-    if totals.discarded_bytes > 0 {
-        write!(out, "; {} bytes outside of telegrams", totals.discarded_bytes)?;
-    }
-    writeln!(out)
 }

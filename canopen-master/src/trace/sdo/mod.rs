@@ -1,5 +1,8 @@
 //! SDO transfers put together by listening: expedited, segmented, block, both directions.
 
+mod late;
+mod step;
+
 use alloc::boxed::Box;
 use alloc::collections::VecDeque;
 use alloc::vec::Vec;
@@ -8,7 +11,9 @@ use core::time::Duration;
 use pdo::{Address, NodeId};
 
 use crate::sdo::AbortCode;
-use crate::sdo::message::{self, BlockSegment, Request, Response, SEGMENT};
+use crate::sdo::message::{BlockSegment, Request, Response, SEGMENT};
+use late::Lead;
+use step::{Step, address, initiates, step};
 
 /// Bytes of one transfer that are kept; of a longer one only its size is counted on.
 pub const MAX_KEPT: usize = 1 << 24;
@@ -46,6 +51,9 @@ pub struct SdoFrame {
     pub content: Content,
     /// The object: from the frame, or from the transfer that it belongs to.
     pub at: Option<Address>,
+    /// It is part of a transfer, which comes out as a [`Transfer`]. False of an answer or an abort whose
+    /// request was not heard, and of what a protocol fault leaves over.
+    pub belongs: bool,
 }
 
 impl SdoFrame {
@@ -108,8 +116,11 @@ pub struct Transfer {
     pub direction: Direction,
     /// How.
     pub mode: Mode,
-    /// Object.
+    /// Object; 0000h:00 of a late transfer that nothing names.
     pub at: Address,
+    /// Its beginning was not heard: the first frame of its channel was one from inside it. Its data and
+    /// its size are those from there on.
+    pub late: bool,
     /// What was transferred, the first [`MAX_KEPT`] bytes of it.
     pub data: Vec<u8>,
     /// Bytes transferred.
@@ -165,6 +176,30 @@ struct Open {
 }
 
 impl Open {
+    fn new(
+        bus: u16,
+        node: NodeId,
+        (at, direction, mode): (Address, Direction, Mode),
+        phase: Phase,
+        now: Option<Duration>,
+    ) -> Self {
+        let transfer = Transfer {
+            bus,
+            node,
+            direction,
+            mode,
+            at,
+            late: false,
+            data: Vec::new(),
+            size: 0,
+            outcome: Outcome::Incomplete,
+            frames: 0,
+            began: now,
+            ended: now,
+        };
+        Self { transfer, phase, confirmed: 0, next: 1, last: None, holes: false }
+    }
+
     fn push(&mut self, bytes: &[u8]) {
         let room = MAX_KEPT.saturating_sub(self.transfer.data.len()).min(bytes.len());
         self.transfer.data.extend_from_slice(bytes.get(..room).unwrap_or(&[]));
@@ -222,11 +257,13 @@ impl Open {
 pub(super) struct Watch {
     node: NodeId,
     open: Option<Box<Open>>,
+    /// Until a transfer is heard from its beginning.
+    lead: Option<Lead>,
 }
 
 impl Watch {
     pub(super) const fn new(node: NodeId) -> Self {
-        Self { node, open: None }
+        Self { node, open: None, lead: Some(Lead::NEW) }
     }
 
     /// Takes a frame of the channel; a transfer that ends with it goes to `events`.
@@ -244,23 +281,20 @@ impl Watch {
             _ => None,
         };
         if let Some((at, direction, mode)) = initiated {
+            if direction == Direction::Upload
+                && self.lead.as_ref().is_some_and(|lead| lead.goes_on(way, data))
+            {
+                // Nobody begins an upload with 41h after 40h: the one before was a segment, too.
+                self.open = None;
+            }
             self.end(Outcome::Incomplete, events);
-            let transfer = Transfer {
-                bus,
-                node: self.node,
-                direction,
-                mode,
-                at,
-                data: Vec::new(),
-                size: 0,
-                outcome: Outcome::Incomplete,
-                frames: 0,
-                began: now,
-                ended: now,
-            };
-            let (phase, next) = (Phase::Initiate, 1);
-            let open = Open { transfer, phase, confirmed: 0, next, last: None, holes: false };
-            self.open = Some(Box::new(open));
+            self.open =
+                Some(Box::new(Open::new(bus, self.node, (at, direction, mode), Phase::Initiate, now)));
+        } else if let Some(lead) = &self.lead
+            && (self.open.is_none() || lead.is_inside_a_block(way, data))
+        {
+            // A segment may have looked like the beginning of a transfer: that one never was.
+            self.open = late::open(bus, self.node, way, &content, now).map(Box::new);
         }
         let known = self.open.as_ref().map(|open| open.transfer.at);
         let belongs = match self.open.as_mut() {
@@ -272,16 +306,25 @@ impl Watch {
             open.transfer.frames += 1;
             open.transfer.ended = now;
         }
+        // What looks like segments of a late transfer may turn out to be those of a block.
+        let known = |open: &Open| {
+            open.phase != Phase::Initiate && !(open.transfer.late && open.transfer.mode == Mode::Segmented)
+        };
+        if matches!(belongs, Step::Ended(_)) || self.open.as_deref().is_some_and(known) {
+            self.lead = None;
+        } else if let Some(lead) = &mut self.lead {
+            lead.heard(way, data);
+        }
         if let Step::Ended(outcome) = belongs {
             self.end(outcome, events);
         }
-        SdoFrame { node: self.node, way, content, at }
+        SdoFrame { node: self.node, way, content, at, belongs: belongs != Step::Foreign }
     }
 
     /// What a frame of the channel says, without any consequence.
     pub(super) fn look(&self, way: Way, data: &[u8]) -> SdoFrame {
         let content = self.parse(way, data);
-        SdoFrame { node: self.node, way, content, at: address(&content) }
+        SdoFrame { node: self.node, way, content, at: address(&content), belongs: false }
     }
 
     /// Ends the open transfer as incomplete.
@@ -308,6 +351,9 @@ impl Watch {
             Way::Response => Response::parse(data).map(Content::Response),
         };
         let whole = whole.unwrap_or_else(|error| Content::Malformed(error.command()));
+        if self.lead.as_ref().is_some_and(|lead| lead.is_inside_a_block(way, data)) {
+            return BlockSegment::parse(data).map_or(whole, Content::Segment);
+        }
         let Some(open) = self.open.as_ref().filter(|open| open.phase == Phase::BlockData && sends(open))
         else {
             return whole;
@@ -331,199 +377,4 @@ const fn is_block_end(content: &Content) -> bool {
         Content::Request(Request::EndBlockDownload { .. })
             | Content::Response(Response::EndBlockUpload { .. })
     )
-}
-
-/// The transfer that a request begins.
-const fn initiates(request: &Request) -> Option<(Address, Direction, Mode)> {
-    match *request {
-        Request::InitiateUpload { at } => Some((at, Direction::Upload, Mode::Expedited)),
-        Request::InitiateDownload { at, content } => Some((at, Direction::Download, mode(&content))),
-        Request::InitiateBlockUpload { at, .. } => Some((at, Direction::Upload, Mode::Block)),
-        Request::InitiateBlockDownload { at, .. } => Some((at, Direction::Download, Mode::Block)),
-        _ => None,
-    }
-}
-
-const fn mode(content: &message::Content) -> Mode {
-    match content {
-        message::Content::Segmented(_) => Mode::Segmented,
-        _ => Mode::Expedited,
-    }
-}
-
-const fn address(content: &Content) -> Option<Address> {
-    match *content {
-        Content::Request(
-            Request::InitiateUpload { at }
-            | Request::InitiateDownload { at, .. }
-            | Request::InitiateBlockUpload { at, .. }
-            | Request::InitiateBlockDownload { at, .. }
-            | Request::Abort { at, .. },
-        )
-        | Content::Response(
-            Response::InitiateUpload { at, .. }
-            | Response::InitiateDownload { at }
-            | Response::InitiateBlockUpload { at, .. }
-            | Response::InitiateBlockDownload { at, .. }
-            | Response::Abort { at, .. },
-        ) => Some(at),
-        _ => None,
-    }
-}
-
-/// What a frame does to the open transfer.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Step {
-    /// Nothing: it does not belong to it.
-    Foreign,
-    /// It goes on.
-    Goes,
-    /// It ends.
-    Ended(Outcome),
-}
-
-fn step(open: &mut Open, content: &Content) -> Step {
-    match content {
-        Content::Request(Request::Abort { at, code }) => aborted(open, *at, Way::Request, *code),
-        Content::Response(Response::Abort { at, code }) => aborted(open, *at, Way::Response, *code),
-        Content::Request(request) => step_request(open, request),
-        Content::Response(response) => step_response(open, response),
-        Content::Segment(segment) => {
-            open.segment(segment);
-            Step::Goes
-        }
-        Content::Malformed(_) => Step::Foreign,
-    }
-}
-
-/// An abort ends the transfer of its object. Servers that cannot tell the object say 0000h:00.
-fn aborted(open: &Open, at: Address, by: Way, code: AbortCode) -> Step {
-    if at == open.transfer.at || at == Address::new(0, 0) {
-        Step::Ended(Outcome::Aborted { by, code })
-    } else {
-        Step::Foreign
-    }
-}
-
-fn step_request(open: &mut Open, request: &Request) -> Step {
-    let upload = open.transfer.direction == Direction::Upload;
-    match (*request, open.phase) {
-        (Request::InitiateDownload { content, .. }, _) => {
-            match content {
-                message::Content::Expedited { data, .. } => {
-                    open.push(message::first(&data.padded(), data.len()));
-                }
-                message::Content::Segmented(_) => {}
-            }
-            Step::Goes
-        }
-        (
-            Request::InitiateUpload { .. }
-            | Request::InitiateBlockUpload { .. }
-            | Request::InitiateBlockDownload { .. },
-            _,
-        ) => Step::Goes,
-        (Request::UploadSegment { toggle }, Phase::Segments { toggle: next, .. })
-            if upload && toggle == next =>
-        {
-            open.phase = Phase::Segments { toggle, asked: true, last: false };
-            Step::Goes
-        }
-        (Request::DownloadSegment { toggle, last, data }, Phase::Segments { toggle: next, asked, .. })
-            if !upload && toggle == next =>
-        {
-            // The same segment again, before its answer, carries nothing new.
-            if !asked {
-                open.push(message::first(&data.padded(), data.len()));
-            }
-            open.phase = Phase::Segments { toggle, asked: true, last };
-            Step::Goes
-        }
-        (Request::StartBlockUpload, Phase::BlockStart) => {
-            open.phase = Phase::BlockData;
-            Step::Goes
-        }
-        (Request::AckBlockUpload { sequence, .. }, Phase::BlockData) if upload => {
-            open.acknowledge(sequence);
-            Step::Goes
-        }
-        (Request::EndBlockUpload, Phase::BlockEnding) if upload => Step::Ended(Outcome::Done),
-        (Request::EndBlockDownload { unused, .. }, Phase::BlockEnd | Phase::BlockData) if !upload => {
-            open.end_of_blocks(unused);
-            Step::Goes
-        }
-        _ => Step::Foreign,
-    }
-}
-
-fn step_response(open: &mut Open, response: &Response) -> Step {
-    let upload = open.transfer.direction == Direction::Upload;
-    let mode = open.transfer.mode;
-    let mine = |at: Address, open: &Open| at == open.transfer.at;
-    match (*response, open.phase) {
-        (Response::InitiateUpload { at, content }, Phase::Initiate) if upload && mine(at, open) => {
-            // The answer to a block upload may be a plain one.
-            open.transfer.mode = self::mode(&content);
-            match content {
-                message::Content::Expedited { data, .. } => {
-                    open.push(message::first(&data.padded(), data.len()));
-                }
-                message::Content::Segmented(_) => {
-                    open.phase = Phase::Segments { toggle: false, asked: false, last: false };
-                    return Step::Goes;
-                }
-            }
-            Step::Ended(Outcome::Done)
-        }
-        (
-            Response::UploadSegment { toggle, last, data },
-            Phase::Segments { toggle: next, asked: true, .. },
-        ) if upload && toggle == next => {
-            open.push(message::first(&data.padded(), data.len()));
-            if last {
-                return Step::Ended(Outcome::Done);
-            }
-            open.phase = Phase::Segments { toggle: !toggle, asked: false, last: false };
-            Step::Goes
-        }
-        (Response::InitiateDownload { at }, Phase::Initiate) if !upload && mine(at, open) => match mode {
-            Mode::Expedited => Step::Ended(Outcome::Done),
-            Mode::Segmented => {
-                open.phase = Phase::Segments { toggle: false, asked: false, last: false };
-                Step::Goes
-            }
-            Mode::Block => Step::Foreign,
-        },
-        (Response::DownloadSegment { toggle }, Phase::Segments { toggle: next, asked: true, last })
-            if !upload && toggle == next =>
-        {
-            if last {
-                return Step::Ended(Outcome::Done);
-            }
-            open.phase = Phase::Segments { toggle: !toggle, asked: false, last: false };
-            Step::Goes
-        }
-        (Response::InitiateBlockDownload { at, .. }, Phase::Initiate)
-            if !upload && mode == Mode::Block && mine(at, open) =>
-        {
-            open.phase = Phase::BlockData;
-            Step::Goes
-        }
-        (Response::AckBlockDownload { sequence, .. }, Phase::BlockData) if !upload => {
-            open.acknowledge(sequence);
-            Step::Goes
-        }
-        (Response::EndBlockDownload, Phase::BlockEnding) if !upload => Step::Ended(Outcome::Done),
-        (Response::InitiateBlockUpload { at, .. }, Phase::Initiate)
-            if upload && mode == Mode::Block && mine(at, open) =>
-        {
-            open.phase = Phase::BlockStart;
-            Step::Goes
-        }
-        (Response::EndBlockUpload { unused, .. }, Phase::BlockEnd | Phase::BlockData) if upload => {
-            open.end_of_blocks(unused);
-            Step::Goes
-        }
-        _ => Step::Foreign,
-    }
 }

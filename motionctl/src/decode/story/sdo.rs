@@ -1,0 +1,107 @@
+//! SDO transfers, and frames of none.
+
+use canopen_master::sdo::message::{Content as Carried, Request, Response};
+use canopen_master::trace::{Content, Direction, Mode, Outcome, SdoFrame, Transfer, Way};
+use canopen_master::{Address, ds402};
+
+use super::super::names::bytes;
+use super::repeats::Cycle;
+use super::{Story, VALUES, who};
+
+impl Story<'_> {
+    /// A frame that is part of no transfer.
+    pub(super) fn stray(
+        &mut self,
+        time: Option<i64>,
+        bus: Option<&str>,
+        number: u16,
+        sdo: &SdoFrame,
+        data: &[u8],
+    ) {
+        let node = sdo.node;
+        let what = match sdo.content {
+            Content::Response(Response::InitiateUpload { at, content: Carried::Expedited { data, .. } }) => {
+                let object = self.names.object(node, at);
+                let value = self.names.words(node, at, data.padded().get(..data.len()).unwrap_or(&[]));
+                format!("read  {object} = {value}, answer to no request in the capture")
+            }
+            Content::Response(Response::InitiateDownload { at }) => {
+                format!(
+                    "write {} is confirmed: answer to no request in the capture",
+                    self.names.object(node, at)
+                )
+            }
+            Content::Response(Response::Abort { at, code }) => {
+                format!("ABORTS {}, {code}: no transfer of it is open", self.names.object(node, at))
+            }
+            Content::Request(Request::Abort { at, code }) => {
+                let object = self.names.object(node, at);
+                format!("{object}: the client ABORTS, {code}: no transfer of it is open")
+            }
+            _ => {
+                if !self.cycle(Cycle::Stray(number, node), time, &[]).0 {
+                    return;
+                }
+                format!("SDO frame that fits no transfer: {}", bytes(data))
+            }
+        };
+        self.say(time, bus, &who(node), &what);
+    }
+
+    /// A transfer that has ended; `remark` stands behind it.
+    pub(super) fn tell(&mut self, transfer: &Transfer, bus: Option<&str>, remark: &str) {
+        let Transfer { node, at, .. } = *transfer;
+        let upload = transfer.direction == Direction::Upload;
+        let news =
+            transfer.is_done() && !transfer.late && self.is_news(transfer.bus, node, at, &transfer.data);
+        let told = self.objects.entry((transfer.bus, node, at, upload)).or_default();
+        let same = told.outcome == Some(transfer.outcome) && told.data == transfer.data && told.values > 0;
+        let writes_state = !upload && matches!(at.index, ds402::CONTROL_WORD | ds402::MODE);
+        if !news && !writes_state && (same || told.values >= VALUES) {
+            told.again += 1;
+            return;
+        }
+        told.values += 1;
+        told.outcome = Some(transfer.outcome);
+        told.data.clone_from(&transfer.data);
+        let more = if told.values == VALUES && !news && !writes_state { " (and so on)" } else { "" };
+        let object = match transfer.late && at == Address::new(0, 0) {
+            true => "an object that is not named".into(),
+            false => self.names.object(node, at),
+        };
+        let value = self.names.words(node, at, &transfer.data);
+        let verb = if upload { "read" } else { "write" };
+        let how = match transfer.mode {
+            Mode::Expedited => String::new(),
+            mode => {
+                let mode = if mode == Mode::Block { "block" } else { "segmented" };
+                format!("  [{mode}, {} bytes{}]", transfer.size, in_ms(transfer.began, transfer.ended))
+            }
+        };
+        let what = match transfer.outcome {
+            Outcome::Done => format!("{verb:<5} {object} = {value}{how}"),
+            Outcome::Aborted { by: Way::Response, code } if upload => {
+                format!("{verb:<5} {object}: REFUSED, {code}{how}")
+            }
+            Outcome::Aborted { by: Way::Response, code } => {
+                format!("{verb:<5} {object} = {value}: REFUSED, {code}{how}")
+            }
+            Outcome::Aborted { by: Way::Request, code } => {
+                format!("{verb:<5} {object}: the client gave up, {code}{how}")
+            }
+            Outcome::Incomplete if transfer.frames == 1 && !transfer.late => {
+                format!("{verb:<5} {object}: NO ANSWER")
+            }
+            Outcome::Incomplete => format!("{verb:<5} {object}: unfinished, {value}{how}"),
+        };
+        let time = transfer.ended.and_then(|time| i64::try_from(time.as_nanos()).ok());
+        self.say(time, bus, &who(node), &format!("{what}{remark}{more}"));
+    }
+}
+
+fn in_ms(from: Option<core::time::Duration>, to: Option<core::time::Duration>) -> String {
+    match from.zip(to).and_then(|(from, to)| to.checked_sub(from)) {
+        Some(time) if !time.is_zero() => format!(" in {:.1} ms", time.as_secs_f64() * 1e3),
+        _ => String::new(),
+    }
+}
