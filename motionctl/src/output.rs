@@ -1,7 +1,7 @@
 //! What goes to standard output and standard error.
 
 use core::cell::RefCell;
-use std::io::{ErrorKind, IsTerminal, Write};
+use std::io::{BufWriter, ErrorKind, IsTerminal, Write};
 use std::path::Path;
 use std::sync::OnceLock;
 
@@ -137,18 +137,46 @@ pub(crate) fn complain(text: core::fmt::Arguments<'_>) {
     let _ = std::io::stderr().write_fmt(text);
 }
 
-/// Writes a file beside its place and moves it there, so that an older one is never half overwritten.
-pub(crate) fn write_beside(path: &Path, bytes: &[u8]) -> Result<(), Exit> {
+/// Writes a file beside its place and moves it there when it is complete, so that an older one is never half
+/// overwritten and nothing incomplete bears its name. What is no file, such as a pipe, is written to.
+pub(crate) fn write_file<T>(
+    path: &Path,
+    write: impl FnOnce(&mut dyn Write) -> Result<T, Exit>,
+) -> Result<T, Exit> {
     let name = path.display().to_string();
     let trouble = |error: &dyn core::fmt::Display| Exit::file(&name, error);
+    if std::fs::metadata(path).is_ok_and(|found| !found.is_file()) {
+        let file = std::fs::OpenOptions::new().write(true).open(path).map_err(|error| trouble(&error))?;
+        let mut file = BufWriter::new(file);
+        let done = write(&mut file)?;
+        file.flush().map_err(|error| trouble(&error))?;
+        return Ok(done);
+    }
+    // A link goes on leading to the file.
+    let path = path.canonicalize().unwrap_or_else(|_| path.into());
     let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut file = tempfile::NamedTempFile::new_in(directory).map_err(|error| trouble(&error))?;
-    file.write_all(bytes).map_err(|error| trouble(&error))?;
+    let mut writer = BufWriter::new(file.as_file_mut());
+    let done = write(&mut writer)?;
+    writer.flush().map_err(|error| trouble(&error))?;
+    drop(writer);
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;
         let _ = file.as_file().set_permissions(std::fs::Permissions::from_mode(0o644));
     }
-    file.persist(path).map_err(|error| trouble(&error))?;
-    Ok(())
+    file.as_file().sync_all().map_err(|error| trouble(&error))?;
+    file.persist(&path).map_err(|error| trouble(&error))?;
+    Ok(done)
+}
+
+/// The same of bytes.
+pub(crate) fn write_beside(path: &Path, bytes: &[u8]) -> Result<(), Exit> {
+    let trouble = |error| Exit::file(&path.display().to_string(), &error);
+    write_file(path, |file| file.write_all(bytes).map_err(trouble))
+}
+
+/// `1 curve`, `2 curves`.
+pub(crate) fn counted(count: usize, one: &str, many: &str) -> String {
+    format!("{count} {}", if count == 1 { one } else { many })
 }

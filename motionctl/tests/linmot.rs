@@ -2,45 +2,11 @@
 #![cfg(unix)]
 
 mod common;
+#[path = "common/linmot.rs"]
+mod linmot;
 
-use common::{Bench, Controller, edit};
-use serde_json::Value;
-
-/// The drive, and the arguments that reach it.
-const CARRIERS: [(&str, &[&str]); 3] = [
-    ("--serial=pty:LINE", &["--port", "LINE"]),
-    ("--can=slcan-pty:LINE", &["--can", "slcan:LINE"]),
-    ("--can=slcan-pty:LINE", &["--can", "slcan:LINE", "--carrier", "pdo"]),
-];
-
-/// Manual B, figure 13.
-const CURVE: &str = "# name=Example_Curve length_ms=200 unit=0.1um\n0\n30154\n116978\n250000\n413176\n586824\n750000\n883022\n969846\n1000000\n";
-
-struct Linmot<'a> {
-    bench: &'a Bench,
-    carrier: &'a [&'a str],
-}
-
-impl Linmot<'_> {
-    fn run(&self, arguments: &[&str]) -> common::Ran {
-        let mut all = vec!["linmot"];
-        all.extend(arguments.iter().take_while(|argument| **argument != "--"));
-        all.extend(self.carrier);
-        all.extend(arguments.iter().skip_while(|argument| **argument != "--"));
-        self.bench.run(&all)
-    }
-
-    #[track_caller]
-    fn json(&self, arguments: &[&str]) -> Value {
-        let mut all = vec!["--json"];
-        all.extend(arguments);
-        self.run(&all).ends(0).json()
-    }
-}
-
-fn drive(bench: &Bench, endpoint: &str) -> Controller {
-    bench.device(&["sim", "linmot", endpoint, "--state", "FLASH"])
-}
+use common::{Bench, edit};
+use linmot::{CARRIERS, CURVE, Linmot, drive};
 
 fn entry(link: u16, name: &str) -> String {
     let [low, high] = link.to_le_bytes();
@@ -112,7 +78,10 @@ fn a_drive_comes_back_from_its_files_over_every_carrier() {
         assert_eq!(again.lines().skip(1).collect::<Vec<_>>(), CURVE.lines().skip(1).collect::<Vec<_>>());
         linmot.run(&["curve", "modify", "23", "D.csv"]).ends(0);
         linmot.run(&["curve", "plot", "23", "-o", "D.svg"]).ends(0);
-        assert!(std::fs::read_to_string(bench.path("D.svg")).unwrap().starts_with("<svg "));
+        let picture = std::fs::read_to_string(bench.path("D.svg")).unwrap();
+        for words in ["<svg ", "curve 23 Example_Curve", "position in mm", "time in ms"] {
+            assert!(picture.contains(words), "{words}");
+        }
         let errors = linmot.json(&["errors"]);
         assert_eq!((errors["logged"].as_u64(), errors["errors"][0]["code"].as_u64()), (Some(2), Some(0x64)));
         assert_eq!(errors["errors"][0]["text"], "Cfg Err: No Motor Defined");
@@ -140,25 +109,39 @@ fn refusals_are_named() {
         linmot.run(&["curve", "add", "5", "C.csv"]).ends(0);
         linmot.run(&["curve", "add", "5", "C.csv"]).ends(4).says("a curve with this ID exists");
         edit(&bench.path("C.csv"), "30154\n", "");
-        linmot.run(&["curve", "modify", "5", "C.csv"]).ends(4).says("size error");
-        linmot.run(&["curve", "add", "101", "C.csv"]).ends(1).says("1 to 100 expected");
+        linmot
+            .run(&["curve", "modify", "5", "C.csv"])
+            .ends(4)
+            .says("nothing was written: curve 5: start modifying curve (RAM): the drive answered D1h, size error")
+            .says(": 9 setpoints in the file, 10 setpoints in the drive's curve");
+        linmot.run(&["curve", "add", "101", "C.csv"]).ends(2).says("1 to 100 expected");
         linmot.run(&["table", "get", "9"]).ends(4).says("no such entry");
         linmot.run(&["table", "set", "9", "--raw", "00"]).ends(2).says("64 expected");
+        let swapped = entry(10, "x").replacen("01A7", "A701", 1);
+        linmot
+            .run(&["table", "set", "9", "--raw", &swapped])
+            .ends(2)
+            .says("A701 at the beginning, 01A7 (version A701h) expected");
         linmot.run(&["table", "set", "9", "--raw", &entry(10, "x")]).ends(0);
         linmot.run(&["table", "check"]).ends(1).says("entry 9 is linked to entry 10, which does not exist");
 
         // Files that do not fit the drive: nothing is written.
         linmot.run(&["pvl", "backup", "B.pvl"]).ends(0);
-        for (from, to, words) in [
-            ("@TreeID 4612", "@TreeID 4613", "layer mc: tree ID 4613 in the file, 4612 in the drive"),
-            ("@SubVersion 5", "@SubVersion 6", "layer interface: sub version 6 in the file, 5 in the drive"),
-            ("13A2h, ", "13B2h, ", "UPID 13B2h is unknown to the drive"),
-            ("119Eh, ", "1B62h, ", "UPID 1B62h is read-only in the drive"),
-            ("119Eh, 0000", "119Eh, 000x", "a hex number of up to 8 digits expected"),
+        for (from, to, status, words) in [
+            ("@TreeID 4612", "@TreeID 4613", 1, "layer mc: tree ID 4613 in the file, 4612 in the drive"),
+            (
+                "@SubVersion 5",
+                "@SubVersion 6",
+                1,
+                "layer interface: sub version 6 in the file, 5 in the drive",
+            ),
+            ("13A2h, ", "13B2h, ", 1, "UPID 13B2h is unknown to the drive"),
+            ("119Eh, ", "1B62h, ", 1, "UPID 1B62h is read-only in the drive"),
+            ("119Eh, 0000", "119Eh, 000x", 5, "a hex number of up to 8 digits expected"),
         ] {
             std::fs::copy(bench.path("B.pvl"), bench.path("X.pvl")).unwrap();
             edit(&bench.path("X.pvl"), from, to);
-            linmot.run(&["--yes", "pvl", "restore", "X.pvl"]).ends(1).says(words);
+            linmot.run(&["--yes", "pvl", "restore", "X.pvl"]).ends(status).says(words);
         }
         // A value that the drive would cut off.
         std::fs::copy(bench.path("B.pvl"), bench.path("X.pvl")).unwrap();
@@ -260,91 +243,6 @@ fn a_value_is_written_whole_or_not_at_all() {
 }
 
 #[test]
-fn files_are_checked_without_a_drive() {
-    let bench = Bench::new();
-    let file = "FileType PVL\nStartObject Parameter\nTreeLayer 2\nTreeID 4612\nMainVersion 3\nSubVersion 0\nStartData\n1194;2\n119E;x\nEndData\nEndObject\n";
-    std::fs::write(bench.path("F.pvl"), file).unwrap();
-    let json = bench.run(&["linmot", "pvl", "check", "F.pvl", "--json"]).ends(1).json();
-    assert_eq!(json["objects"][0]["tree_id"], 4612);
-    let diagnostics = json["diagnostics"].as_array().unwrap();
-    assert_eq!((diagnostics.len(), diagnostics[0]["line"].as_u64()), (1, Some(9)));
-    assert_eq!(diagnostics[0]["severity"], "error");
-    bench.run(&["linmot", "pvl", "check", "none.pvl"]).ends(5);
-    std::fs::write(bench.path("L.pvl"), vec![b'x'; 5000]).unwrap();
-    bench.run(&["linmot", "pvl", "check", "L.pvl"]).ends(5).says("L.pvl: line 1 is longer than 4096 bytes");
-    // Before the endpoint is opened.
-    for (content, words) in [
-        (
-            "# length_ms=1\n0\nfive\n",
-            "line 3: a setpoint, -2147483648 to 2147483647, expected, \"five\" found",
-        ),
-        ("0\n1\n", "line 1: # name=… length_ms=… unit=0.1um expected, \"0\" found"),
-        ("# length_ms=1\n0\n", "1 setpoints, 2 to 16383 expected"),
-    ] {
-        std::fs::write(bench.path("C.csv"), content).unwrap();
-        bench.run(&["linmot", "curve", "add", "1", "C.csv", "--can", "slcan:NONE"]).ends(1).says(words);
-    }
-}
-
-/// Setpoints of a file that `curve build` wrote.
-fn setpoints(bench: &Bench, file: &str) -> Vec<i32> {
-    let text = std::fs::read_to_string(bench.path(file)).unwrap();
-    text.lines().skip(1).map(|line| line.parse().unwrap()).collect()
-}
-
-#[test]
-fn curves_are_built_without_a_drive() {
-    let bench = Bench::new();
-    let build = |arguments: &[&str]| {
-        bench.run(&[&["linmot", "curve", "build", "--output", "C.csv"], arguments].concat())
-    };
-    // Manual B, figure 13.
-    let example = ["--name", "Example_Curve", "--to", "100mm", "--length", "200ms", "--setpoints", "10"];
-    build(&example).ends(0).says("10 setpoints, 200 ms");
-    let text = std::fs::read_to_string(bench.path("C.csv")).unwrap();
-    assert!(text.starts_with("# name=Example_Curve length_ms=200 unit=0.1um "), "{text}");
-    assert_eq!(text.lines().skip(1).collect::<Vec<_>>(), CURVE.lines().skip(1).collect::<Vec<_>>());
-    // 50 ms and 25 mm up to 1 m/s, 50 ms at that speed, 50 ms down.
-    let limits = ["--to", "100mm", "--velocity", "1m/s", "--acceleration", "20m/s2", "--setpoints", "151"];
-    build(&limits).ends(0).says("151 setpoints, 150 ms, up to 1.0000 m/s");
-    let found = setpoints(&bench, "C.csv");
-    assert_eq!(
-        [found[0], found[10], found[50], found[75], found[100], found[150]],
-        [0, 10_000, 250_000, 500_000, 750_000, 1_000_000]
-    );
-    build(&[
-        "--from",
-        "-1mm",
-        "--to",
-        "1mm",
-        "--length",
-        "3600inc",
-        "--profile",
-        "trapezoid",
-        "--setpoints",
-        "7",
-    ])
-    .ends(0)
-    .says("cam, 3600 increments");
-    assert_eq!(setpoints(&bench, "C.csv"), [-10_000, -8750, -5000, 0, 5000, 8750, 10_000]);
-    std::fs::write(bench.path("P.csv"), "# ms; mm\n0; 0\n10; 1\n40; -2\n").unwrap();
-    build(&["--points", "P.csv", "--setpoints", "5"]).ends(0).says("5 setpoints, 40 ms");
-    assert_eq!(setpoints(&bench, "C.csv"), [0, 10_000, 0, -10_000, -20_000]);
-    for (content, words) in [
-        ("0 0\n0 1\n", "line 2: an x above the one before expected, \"0 1\" found"),
-        ("0 0\n5\n", "line 2: two numbers, x and y in mm, expected, \"5\" found"),
-        ("0 0\n5 five\n", "line 2"),
-        ("0 0\n", "1 points, at least 2 expected"),
-    ] {
-        std::fs::write(bench.path("P.csv"), content).unwrap();
-        build(&["--points", "P.csv"]).ends(1).says(words);
-    }
-    build(&["--to", "50", "--length", "1s"]).ends(2).says("a number with its unit expected");
-    build(&["--to", "50mm", "--length", "1mm"]).ends(2).says("--length: a time in ms or s");
-    build(&["--to", "500m", "--length", "1s"]).ends(2).says("--to: -214748mm to 214748mm expected");
-}
-
-#[test]
 fn a_drive_on_can_waits_for_its_node_id_and_is_guarded() {
     let bench = Bench::new();
     let sim = ["sim", "linmot", "--can=slcan-pty:LINE", "--node", "255", "--serial-number", "77"];
@@ -356,4 +254,48 @@ fn a_drive_on_can_waits_for_its_node_id_and_is_guarded() {
     run(&["can", "sdo", "read", "5", "0x1008", "--type", "string"]).ends(0).says("Virtual LinMot drive");
     run(&["can", "guard", "5", "--for", "0.3"]).ends(0).says("pre-operational");
     run(&["linmot", "params", "get", "13A2h", "--node", "5"]).ends(0).says("default 10");
+}
+
+/// A drive that is away already is waited for too, and the restart that was asked for comes after.
+#[test]
+fn a_restart_is_waited_for_while_another_goes_on() {
+    for (endpoint, carrier) in CARRIERS {
+        let bench = Bench::new();
+        let _drive = drive(&bench, endpoint);
+        let linmot = Linmot { bench: &bench, carrier };
+        linmot.run(&["restart"]).ends(0).says("restarting");
+        linmot.run(&["restart", "--wait"]).ends(0).says("restarted, the drive answers");
+    }
+}
+
+#[test]
+fn the_endpoint_may_come_from_the_environment_or_the_configuration() {
+    let bench = Bench::new();
+    let _drive = drive(&bench, "--can=slcan-pty:LINE");
+    let get = ["linmot", "params", "get", "13A2h"];
+    let with = |name: &str, value: &str| {
+        let mut command = bench.command(&get);
+        common::Ran(command.env(name, value).output().unwrap())
+    };
+    with("MOTIONCTL_CAN", "slcan:LINE").ends(0).says("default 10");
+    // The command line comes first.
+    let mut command = bench.command(&[&get[..], &["--can", "slcan:LINE"]].concat());
+    common::Ran(command.env("MOTIONCTL_CAN", "slcan:NONE").output().unwrap()).ends(0);
+    std::fs::write(bench.path("N.toml"), "can = \"machine\"\n[endpoints]\nmachine = \"slcan:LINE\"\n")
+        .unwrap();
+    with("MOTIONCTL_CONFIG", "N.toml").ends(0).says("default 10");
+    bench.run(&[&get[..], &["--config", "N.toml", "--can", "machine"]].concat()).ends(0);
+    bench.run(&get).ends(2).says("no drive: --can EP, --port EP, MOTIONCTL_CAN, MOTIONCTL_PORT");
+    bench.run(&[&get[..], &["--config", "none.toml"]].concat()).ends(5).says("none.toml");
+}
+
+#[test]
+fn a_dry_run_of_reading_a_curve_touches_nothing() {
+    let bench = Bench::new();
+    for command in ["get", "plot"] {
+        let arguments = ["--dry-run", "linmot", "curve", command, "23", "-o", "D", "--can", "slcan:NONE"];
+        bench.run(&arguments).ends(0).says("would read curve 23 and write it to D");
+        bench.run(&["linmot", "curve", command, "101", "-o", "D"]).ends(2).says("1 to 100 expected");
+    }
+    assert!(!bench.path("D").exists());
 }

@@ -62,14 +62,14 @@ pub enum Severity {
 #[non_exhaustive]
 pub enum Problem {
     /// The file does not begin with `FileType PVL`.
-    #[error("the file does not begin with FileType PVL")]
-    FileType,
+    #[error("no PVL file: FileType PVL expected at its beginning, {0:?} found")]
+    FileType(Excerpt),
     /// Another format version than 1.
     #[error("format version is not 1")]
     FormatVersion,
-    /// A line outside of any object or block.
-    #[error("a line that belongs to no object")]
-    Stray,
+    /// A line outside of any object or block, the first of those that follow each other.
+    #[error("a keyword such as StartObject expected, {0:?} found")]
+    Stray(Excerpt),
     /// An object of an unknown kind, which is passed over.
     #[error("unknown kind of object {0:?}, Parameter or Curve expected")]
     Object(Excerpt),

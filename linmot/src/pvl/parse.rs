@@ -26,6 +26,7 @@ pub struct Parser {
     line: usize,
     place: Place,
     began: bool,
+    stray: bool,
     objects: usize,
     layer: Option<u32>,
     identity: [Option<u32>; 3],
@@ -55,6 +56,7 @@ impl Parser {
             line: 0,
             place: Place::Outside,
             began: false,
+            stray: false,
             objects: 0,
             layer: None,
             identity: [None; 3],
@@ -94,10 +96,12 @@ impl Parser {
         if !self.began {
             self.began = true;
             if !word.eq_ignore_ascii_case("FileType") || !value.eq_ignore_ascii_case("PVL") {
-                self.problem(sink, Severity::Error, Problem::FileType);
+                self.problem(sink, Severity::Error, Problem::FileType(Excerpt::of(text)));
             }
         }
-        if !self.keyword(word, value, bare, sink) {
+        if self.keyword(word, value, bare, sink) {
+            self.stray = false;
+        } else {
             self.row(text, sink);
         }
     }
@@ -330,7 +334,10 @@ impl Parser {
             }
             Place::Unknown => {}
             Place::Outside | Place::Parameters | Place::Curve => {
-                self.problem(sink, Severity::Warning, Problem::Stray);
+                // Of a run of such lines one is enough: a file of another kind has nothing else.
+                if !core::mem::replace(&mut self.stray, true) {
+                    self.problem(sink, Severity::Warning, Problem::Stray(Excerpt::of(text)));
+                }
             }
         }
     }
@@ -506,7 +513,20 @@ mod tests {
         assert_eq!(with("@CurveID 23", "@CurveID 24")[0].1, Severity::Warning);
         assert_eq!(
             with("@FileType PVL", "")[0],
-            (2, wrong, "the file does not begin with FileType PVL".into())
+            (
+                2,
+                wrong,
+                "no PVL file: FileType PVL expected at its beginning, \"@FormatVersion 1\" found".into()
+            )
+        );
+        // Any other text: its kind, where its first line is, and that nothing was found.
+        assert_eq!(
+            problems("[package]\nname = \"x\"\n\nversion = 1"),
+            [
+                (1, wrong, "no PVL file: FileType PVL expected at its beginning, \"[package]\" found".into()),
+                (1, Severity::Warning, "a keyword such as StartObject expected, \"[package]\" found".into()),
+                (4, wrong, "the file has no parameter object and no curve".into()),
+            ]
         );
         assert_eq!(with("@EndData", "").len(), 1);
         assert_eq!(

@@ -13,7 +13,7 @@ use super::cli::{Build, Kind, ProfileName, Quantity};
 use super::curve;
 use crate::cli::Global;
 use crate::exit::Exit;
-use crate::output::Output;
+use crate::output::{Output, counted};
 
 /// Units of x in a second.
 const SECOND: f64 = 1e5;
@@ -151,7 +151,7 @@ fn points(path: &Path) -> Result<Vec<(f64, f64)>, Exit> {
         }
         let shown: String = line.chars().take(40).collect();
         let wrong = |expected: &str| {
-            Exit::check(format!("{name}: line {number}: {expected} expected, {shown:?} found"))
+            Exit::file(&name, &format!("line {number}: {expected} expected, {shown:?} found"))
         };
         let numbers: Option<Vec<f64>> = line
             .split([',', ';', '\t', ' '])
@@ -169,7 +169,8 @@ fn points(path: &Path) -> Result<Vec<(f64, f64)>, Exit> {
         points.push((x, y));
     }
     if points.len() < 2 {
-        return Err(Exit::check(format!("{name}: {} points, at least 2 expected", points.len())));
+        let found = counted(points.len(), "point", "points");
+        return Err(Exit::file(&name, &format!("{found}, at least 2 expected")));
     }
     Ok(points)
 }

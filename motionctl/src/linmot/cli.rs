@@ -7,10 +7,12 @@ use linmot::upid::Upid;
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct Drive {
-    /// CAN endpoint: socketcan:can0, slcan:/dev/ttyACM0?bitrate=500000, socketcand:HOST:PORT/can0
+    /// CAN endpoint: socketcan:can0, slcan:/dev/ttyACM0?bitrate=500000, socketcand:HOST:PORT/can0, or a name
+    /// of the configuration; without --can and --port that of MOTIONCTL_CAN, or of the configuration
     #[arg(long, value_name = "EP", conflicts_with = "port")]
     pub(crate) can: Option<String>,
-    /// Serial endpoint, for LinRS: /dev/ttyUSB0, serial:PATH?baud=…&parity=…, tcp:HOST:PORT, or a name of the configuration
+    /// Serial endpoint, for LinRS: /dev/ttyUSB0, serial:PATH?baud=…&parity=…, tcp:HOST:PORT, or a name of the
+    /// configuration; MOTIONCTL_PORT where no CAN endpoint is named
     #[arg(long, value_name = "EP")]
     pub(crate) port: Option<String>,
     /// CANopen node ID, or LinRS ID
@@ -152,6 +154,7 @@ pub(crate) enum Curve {
     Get {
         #[command(flatten)]
         drive: Drive,
+        /// 1 to 100
         id: u16,
         /// CSV with all that the drive knows of the curve
         #[arg(long, short, value_name = "F")]
@@ -161,6 +164,7 @@ pub(crate) enum Curve {
     Add {
         #[command(flatten)]
         drive: Drive,
+        /// 1 to 100
         id: u16,
         /// What `get` wrote, or CSV: `# name=… length_ms=… unit=0.1um`, then one setpoint a line
         file: PathBuf,
@@ -169,7 +173,9 @@ pub(crate) enum Curve {
     Modify {
         #[command(flatten)]
         drive: Drive,
+        /// 1 to 100
         id: u16,
+        /// As for `add`
         file: PathBuf,
     },
     /// A curve file from a motion profile, or from points; needs no drive
@@ -188,7 +194,9 @@ pub(crate) enum Curve {
     Plot {
         #[command(flatten)]
         drive: Drive,
+        /// 1 to 100
         id: u16,
+        /// The picture
         #[arg(long, short, value_name = "F.svg")]
         output: PathBuf,
     },
@@ -311,6 +319,7 @@ pub(crate) enum Table {
     Get {
         #[command(flatten)]
         drive: Drive,
+        /// 1 to 255
         #[arg(value_parser = clap::value_parser!(u16).range(1..=255))]
         entry: u16,
     },
@@ -318,9 +327,12 @@ pub(crate) enum Table {
     Set {
         #[command(flatten)]
         drive: Drive,
+        /// 1 to 255
         #[arg(value_parser = clap::value_parser!(u16).range(1..=255))]
         entry: u16,
-        /// 64 bytes in hex
+        /// 64 bytes in hex, words low byte first: 01A7; the entry that follows by itself, 0500 for entry 5 or
+        /// FFFF for none; motion command header; 32 bytes of its parameters; name of 16 characters, filled
+        /// with 00; 10 bytes 00
         #[arg(long, value_name = "HEX")]
         raw: String,
     },
@@ -328,6 +340,7 @@ pub(crate) enum Table {
     Delete {
         #[command(flatten)]
         drive: Drive,
+        /// 1 to 255
         #[arg(value_parser = clap::value_parser!(u16).range(1..=255))]
         entry: u16,
     },

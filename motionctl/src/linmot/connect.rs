@@ -12,7 +12,8 @@ use motion_io::port::{Role, open};
 use pdo::NodeId;
 
 use super::cli::{Carrier, Drive, SumKind};
-use crate::cli::{Global, Line};
+use crate::cli::Global;
+use crate::connect::{ChoiceOf, choose};
 use crate::exit::Exit;
 
 /// Reads are repeated so often.
@@ -47,18 +48,18 @@ pub(super) fn connect(global: &Global, drive: &Drive) -> Result<AnyLink, Exit> {
                 .ok_or_else(|| Exit::usage(format!("--timeout {seconds}: seconds above 0 expected")))
         })
         .transpose()?;
-    let Some(can) = &drive.can else {
-        let line = Line { port: drive.port.clone(), device: None };
-        let endpoint = crate::connect::endpoint(global, &line)?;
+    let (carrier, endpoint) = endpoint(global, drive)?;
+    let wrong = |error: motion_io::endpoint::EndpointError| Exit::usage(error.to_string());
+    if carrier == ChoiceOf::Port {
+        let endpoint = endpoint.parse().map_err(wrong)?;
         let mut config = Config::new(drive.node);
         config.checksum = checksum(drive.checksum);
         config.answer = timeout.unwrap_or(config.answer);
         let port = open(&endpoint, Role::Master).map_err(|error| Exit::trouble(error.to_string()))?;
         return Ok(AnyLink(Box::new(LinRsLink::new(port, config, RETRIES))));
-    };
+    }
     let node = NodeId::new(drive.node).map_err(|error| Exit::usage(format!("--node: {error}")))?;
-    let endpoint =
-        can.parse().map_err(|error: motion_io::endpoint::EndpointError| Exit::usage(error.to_string()))?;
+    let endpoint = endpoint.parse().map_err(wrong)?;
     let port = motion_io::can::open(&endpoint).map_err(|error| Exit::trouble(error.to_string()))?;
     Ok(AnyLink(match drive.carrier {
         Carrier::Sdo => Box::new(SdoLink::new(port, node, timeout, RETRIES)),
@@ -68,6 +69,35 @@ pub(super) fn connect(global: &Global, drive: &Drive) -> Result<AnyLink, Exit> {
             Box::new(PdoLink::new(port, node, linmot::client::Client::new(config)))
         }
     }))
+}
+
+/// What names the drive's endpoint, and of which kind it is: the command line before the environment before
+/// the configuration, and in each of them a CAN endpoint before a serial one.
+fn endpoint(global: &Global, drive: &Drive) -> Result<(ChoiceOf, String), Exit> {
+    let environment = |name| std::env::var(name).ok().filter(|text| !text.is_empty());
+    let named = [
+        (ChoiceOf::Can, drive.can.clone()),
+        (ChoiceOf::Port, drive.port.clone()),
+        (ChoiceOf::Can, environment("MOTIONCTL_CAN")),
+        (ChoiceOf::Port, environment("MOTIONCTL_PORT")),
+    ];
+    for (kind, text) in named {
+        if text.is_some() {
+            return Ok((kind, choose(global, text.as_deref(), kind)?));
+        }
+    }
+    let configured =
+        [ChoiceOf::Can, ChoiceOf::Port].into_iter().find_map(|kind| match choose(global, None, kind) {
+            Ok(text) => Some(Ok((kind, text))),
+            Err(exit) if exit.status == 2 => None,
+            Err(exit) => Some(Err(exit)),
+        });
+    configured.unwrap_or_else(|| {
+        Err(Exit::usage(
+            "no drive: --can EP, --port EP, MOTIONCTL_CAN, MOTIONCTL_PORT, or `can` or `port` in the \
+             configuration file expected",
+        ))
+    })
 }
 
 impl From<LinkError> for Exit {
@@ -100,7 +130,7 @@ impl From<TransferError<LinkError>> for Exit {
     fn from(error: TransferError<LinkError>) -> Self {
         match error {
             TransferError::Drive(fault) => fault.into(),
-            TransferError::File(error) => Self::trouble(error.to_string()),
+            TransferError::File(_) | TransferError::Check { .. } => Self::trouble(error.to_string()),
             other => Self::check(other.to_string()),
         }
     }

@@ -1,41 +1,37 @@
 //! `motionctl linmot curve`.
 
-use core::fmt::Write as _;
 use std::fs::File;
-use std::io::{BufReader, BufWriter, Write as _};
+use std::io::BufReader;
 use std::path::Path;
 
-use linmot::curve::{IDS, InfoBlock, ObjectType, Unit};
-use linmot::link::LinkExt;
+use linmot::code::Status;
+use linmot::curve::{CurveError, IDS, InfoBlock, ObjectType, Unit};
+use linmot::link::{Fault, LinkExt};
 use linmot::request::{Access, Request};
-use motion_io::linmot::curve_file::{self, CurveFileError};
+use motion_io::linmot::{LinkError, curve_file};
 use serde_json::{Value, json};
 
-use super::cli::{Curve, Drive};
+use super::cli::{Curve as Command, Drive};
 use super::connect::{AnyLink, connect};
 use super::{build, stopped, text};
 use crate::cli::Global;
 use crate::exit::Exit;
-use crate::output::Output;
+use crate::output::{Output, counted, write_beside, write_file};
+use crate::plot::{Curve, Panel, drawing};
 
-pub(super) fn run(out: &Output, global: &Global, command: &Curve) -> Result<(), Exit> {
+pub(super) fn run(out: &Output, global: &Global, command: &Command) -> Result<(), Exit> {
     match command {
-        Curve::List { drive } => list(out, global, drive),
-        Curve::Get { drive, id, output } => {
-            let (info, setpoints) = read(out, &mut connect(global, drive)?, *id)?;
-            save(output, &info, &setpoints)?;
-            told(out, &info, &output.display().to_string())
+        Command::List { drive } => list(out, global, drive),
+        Command::Get { drive, id, output } => {
+            take(out, global, drive, *id, output, |info, setpoints| save(output, info, setpoints))
         }
-        Curve::Plot { drive, id, output } => {
-            let (info, setpoints) = read(out, &mut connect(global, drive)?, *id)?;
-            let name = output.display().to_string();
-            std::fs::write(output, svg(&info, &setpoints)).map_err(|error| Exit::file(&name, &error))?;
-            told(out, &info, &name)
+        Command::Plot { drive, id, output } => {
+            take(out, global, drive, *id, output, |info, setpoints| plot(output, info, setpoints))
         }
-        Curve::Build(arguments) => build::run(out, global, arguments),
-        Curve::Add { drive, id, file } => write(out, global, drive, Access::Add, *id, file),
-        Curve::Modify { drive, id, file } => write(out, global, drive, Access::Modify, *id, file),
-        Curve::Save { drive } => {
+        Command::Build(arguments) => build::run(out, global, arguments),
+        Command::Add { drive, id, file } => write(out, global, drive, Access::Add, *id, file),
+        Command::Modify { drive, id, file } => write(out, global, drive, Access::Modify, *id, file),
+        Command::Save { drive } => {
             if global.dry_run {
                 out.say("would save all curves to flash");
                 return Ok(());
@@ -46,7 +42,7 @@ pub(super) fn run(out: &Output, global: &Global, command: &Curve) -> Result<(), 
             out.document(json!({ "saved": true }), || println!("all curves are in flash"));
             Ok(())
         }
-        Curve::DeleteAll { drive } => {
+        Command::DeleteAll { drive } => {
             if global.dry_run {
                 out.say("would delete all curves in RAM");
                 return Ok(());
@@ -60,21 +56,16 @@ pub(super) fn run(out: &Output, global: &Global, command: &Curve) -> Result<(), 
 }
 
 pub(super) fn save(path: &Path, info: &InfoBlock, setpoints: &[i32]) -> Result<(), Exit> {
-    let write = || -> std::io::Result<()> {
-        let mut file = BufWriter::new(File::create(path)?);
-        curve_file::write(&mut file, info, setpoints)?;
-        file.flush()
-    };
-    write().map_err(|error| Exit::file(&path.display().to_string(), &error))
+    write_file(path, |mut file| {
+        curve_file::write(&mut file, info, setpoints)
+            .map_err(|error| Exit::file(&path.display().to_string(), &error))
+    })
 }
 
 fn load(path: &Path, id: u16) -> Result<(InfoBlock, Vec<i32>), Exit> {
     let name = path.display().to_string();
     let file = File::open(path).map_err(|error| Exit::file(&name, &error))?;
-    curve_file::read(&mut BufReader::new(file), id).map_err(|error| match error {
-        CurveFileError::Io(error) => Exit::file(&name, &error),
-        other => Exit::check(format!("{name}: {other}")),
-    })
+    curve_file::read(&mut BufReader::new(file), id).map_err(|error| Exit::file(&name, &error))
 }
 
 pub(super) fn to_json(info: &InfoBlock) -> Value {
@@ -96,14 +87,35 @@ pub(super) fn describe(info: &InfoBlock) -> String {
         ObjectType::POSITION_ENCODER => format!("cam, {} increments", info.x_length),
         other => format!("type {:04X}h, length {}", other.0, info.x_length),
     };
-    format!("{:3}  {:21}  {} setpoints, {kind}", info.id, text(info.name()), info.setpoints)
+    format!("{:3}  {:21}  {}, {kind}", info.id, text(info.name()), setpoints_of(info))
 }
 
-fn told(out: &Output, info: &InfoBlock, file: &str) -> Result<(), Exit> {
-    out.document(json!({ "curve": to_json(info), "file": file }), || {
-        println!("{}, written to {file}", describe(info));
+/// One curve of the drive into a file.
+fn take(
+    out: &Output,
+    global: &Global,
+    drive: &Drive,
+    id: u16,
+    file: &Path,
+    keep: impl FnOnce(&InfoBlock, &[i32]) -> Result<(), Exit>,
+) -> Result<(), Exit> {
+    let id = usable(id)?;
+    let file = file.display();
+    if global.dry_run {
+        out.say(&format!("would read curve {id} and write it to {file}"));
+        return Ok(());
+    }
+    let (info, setpoints) = read(out, &mut connect(global, drive)?, id)?;
+    keep(&info, &setpoints)?;
+    out.document(json!({ "curve": to_json(&info), "file": file.to_string() }), || {
+        println!("{}, written to {file}", describe(&info));
     });
     Ok(())
+}
+
+fn usable(id: u16) -> Result<u16, Exit> {
+    let known = IDS.contains(&id);
+    known.then_some(id).ok_or_else(|| Exit::usage(CurveError::Id(id).to_string()))
 }
 
 fn list(out: &Output, global: &Global, drive: &Drive) -> Result<(), Exit> {
@@ -143,22 +155,17 @@ fn write(
     id: u16,
     file: &Path,
 ) -> Result<(), Exit> {
-    let (info, setpoints) = load(file, id)?;
+    let (info, setpoints) = load(file, usable(id)?)?;
     if global.dry_run {
         out.say(&format!("would write {}", describe(&info)));
         return Ok(());
     }
     let mut link = connect(global, drive)?;
-    link.start_curve(access, &info)?;
+    link.start_curve(access, &info).map_err(|fault| not_started(&mut link, access, &info, fault))?;
     let bar = out.progress("writing", setpoints.len());
     for (number, setpoint) in (1..).zip(&setpoints) {
-        link.write_setpoint(access, &info, number, *setpoint).map_err(|fault| {
-            let left = match access {
-                Access::Modify => "the curve's info block is written, its setpoints are the old ones",
-                _ => "the curve was not added",
-            };
-            Exit::from(fault).context(left)
-        })?;
+        link.write_setpoint(access, &info, number, *setpoint)
+            .map_err(|fault| Exit::from(fault).context(left(access)))?;
         bar.inc(1);
     }
     bar.finish_and_clear();
@@ -166,52 +173,55 @@ fn write(
     Ok(())
 }
 
-/// Setpoints over x, as a line in a frame.
-fn svg(info: &InfoBlock, setpoints: &[i32]) -> String {
-    const WIDTH: f64 = 800.0;
-    const HEIGHT: f64 = 400.0;
-    const MARGIN: f64 = 60.0;
-    /// Left of the frame, for positions.
-    const LEFT: f64 = 120.0;
-    let (low, high) =
-        setpoints.iter().fold((i32::MAX, i32::MIN), |(low, high), y| (low.min(*y), high.max(*y)));
-    let span = (f64::from(high) - f64::from(low)).max(1.0);
-    let last = (setpoints.len().max(2) - 1) as f64;
-    let points = setpoints.iter().enumerate().fold(String::new(), |mut points, (n, y)| {
-        let x = LEFT + WIDTH * n as f64 / last;
-        let y = MARGIN + HEIGHT * (f64::from(high) - f64::from(*y)) / span;
-        let _ = write!(points, "{x:.2},{y:.2} ");
-        points
-    });
-    let escaped = text(info.name()).replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
-    let length = match info.x_unit {
-        Unit::TIME => format!("{} ms", f64::from(info.x_length) / 100.0),
-        _ => format!("{} increments", info.x_length),
+/// What a curve is that was begun and not completed.
+const fn left(access: Access) -> &'static str {
+    match access {
+        Access::Modify => "the curve's info block may be written, its setpoints are the old ones",
+        _ => "the curve was not added",
+    }
+}
+
+/// Why a curve could not be begun; of another size than the drive's, both are told.
+fn not_started(link: &mut AnyLink, access: Access, info: &InfoBlock, fault: Fault<LinkError>) -> Exit {
+    let (start, size) = match fault {
+        Fault::Curve { .. } => (true, false),
+        Fault::Refused { request: Request::StartCurve { .. }, reply } => (true, reply.status == Status::SIZE),
+        _ => (false, false),
     };
-    // Setpoints are in 0.1 µm.
-    let mm = |value: i32| f64::from(value) / 10_000.0;
-    format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {} {}\" font-family=\"sans-serif\" font-size=\"14\">\n\
-         <rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n\
-         <rect x=\"{LEFT}\" y=\"{MARGIN}\" width=\"{WIDTH}\" height=\"{HEIGHT}\" fill=\"none\" stroke=\"#999\"/>\n\
-         <text x=\"{LEFT}\" y=\"30\">curve {} {escaped}</text>\n\
-         <text x=\"{LEFT}\" y=\"{}\">0</text>\n\
-         <text x=\"{}\" y=\"{}\" text-anchor=\"end\">{length}</text>\n\
-         <text x=\"{}\" y=\"{}\" text-anchor=\"end\">{} mm</text>\n\
-         <text x=\"{}\" y=\"{}\" text-anchor=\"end\">{} mm</text>\n\
-         <polyline points=\"{}\" fill=\"none\" stroke=\"#06c\" stroke-width=\"2\"/>\n</svg>\n",
-        LEFT + WIDTH + MARGIN,
-        HEIGHT + 2.0 * MARGIN,
-        info.id,
-        HEIGHT + MARGIN + 20.0,
-        LEFT + WIDTH,
-        HEIGHT + MARGIN + 20.0,
-        LEFT - 8.0,
-        MARGIN + 10.0,
-        mm(high),
-        LEFT - 8.0,
-        HEIGHT + MARGIN,
-        mm(low),
-        points.trim_end(),
-    )
+    let mut exit = Exit::from(fault).context(if start { "nothing was written" } else { left(access) });
+    if size
+        && access == Access::Modify
+        && let Ok(Some(found)) = link.curve_info(info.id)
+    {
+        exit.message = format!(
+            "{}: {} in the file, {} in the drive's curve",
+            exit.message,
+            setpoints_of(info),
+            setpoints_of(&found)
+        );
+    }
+    exit
+}
+
+fn setpoints_of(info: &InfoBlock) -> String {
+    counted(info.setpoints.into(), "setpoint", "setpoints")
+}
+
+/// Draws position over x.
+fn plot(path: &Path, info: &InfoBlock, setpoints: &[i32]) -> Result<(), Exit> {
+    let (x, length) = match info.x_unit {
+        Unit::TIME => ("time in ms", f64::from(info.x_length) / 100.0),
+        _ => ("encoder position in increments", f64::from(info.x_length)),
+    };
+    let last = (setpoints.len().max(2) - 1) as f64;
+    let point = |(number, setpoint): (usize, &i32)| {
+        // Setpoints are in 0.1 µm.
+        (length * number as f64 / last, f64::from(*setpoint) / 10_000.0)
+    };
+    let points = setpoints.iter().enumerate().map(point).collect();
+    let panel = Panel { title: "position in mm".into(), curves: vec![Curve { name: String::new(), points }] };
+    let title = format!("curve {} {}", info.id, text(info.name()));
+    let drawn = drawing(title.trim(), x, &[panel])
+        .map_err(|error| Exit::file(&path.display().to_string(), &error))?;
+    write_beside(path, drawn.as_bytes())
 }

@@ -20,12 +20,12 @@ use serde_json::json;
 
 use crate::cli::Global;
 use crate::exit::Exit;
-use crate::output::Output;
+use crate::output::{Output, counted};
 use cli::{Drive, Linmot};
 use connect::{AnyLink, connect};
 
 /// Longest time that a restart is waited for.
-const RESTART: Duration = Duration::from_secs(30);
+const RESTART: Duration = Duration::from_secs(15);
 
 pub(crate) fn run(out: &Output, global: &Global, command: &Linmot) -> Result<(), Exit> {
     match command {
@@ -58,7 +58,7 @@ fn errors(out: &Output, global: &Global, drive: &Drive) -> Result<(), Exit> {
         })
         .collect();
     out.document(json!({ "logged": logged, "occurred": occurred, "errors": json }), || {
-        println!("{logged} errors logged, {occurred} occurred");
+        println!("{} logged, {occurred} occurred", counted(logged.into(), "error", "errors"));
         for (entry, error, text) in &list {
             let seconds = f64::from(error.milliseconds) / 1000.0;
             println!("{entry:2}  {:04X}h  {} h {seconds:.3} s  {text}", error.code, error.hours);
@@ -74,26 +74,35 @@ fn restart(out: &Output, global: &Global, drive: &Drive, wait: bool) -> Result<(
     }
     out.confirm_on_terminal(global.yes, "Restart the drive? Its motion stops.")?;
     let mut link = connect(global, drive)?;
+    if wait {
+        // It may be restarting already.
+        answers(&mut link)?;
+    }
     link.ask(Request::Restart)?;
     if wait {
-        let began = Instant::now();
         // The answer to a first question may still come from before the restart.
         std::thread::sleep(Duration::from_millis(100));
-        let [tree_id, ..] = Layer::Os.identity();
-        let question = Request::Read { value: Value::Ram, upid: tree_id };
-        loop {
-            match link.call(&question) {
-                Ok(_) => break,
-                Err(error @ LinkError::Port(_)) => return Err(error.into()),
-                Err(error) if began.elapsed() > RESTART => return Err(error.into()),
-                Err(_) => {}
-            }
-        }
+        answers(&mut link)?;
     }
     out.document(json!({ "restarted": true, "answers": wait }), || {
         println!("{}", if wait { "restarted, the drive answers" } else { "restarting" });
     });
     Ok(())
+}
+
+/// Waits until the drive answers.
+fn answers(link: &mut AnyLink) -> Result<(), Exit> {
+    let began = Instant::now();
+    let [tree_id, ..] = Layer::Os.identity();
+    let question = Request::Read { value: Value::Ram, upid: tree_id };
+    loop {
+        match link.call(&question) {
+            Ok(_) => return Ok(()),
+            Err(error @ (LinkError::Port(_) | LinkError::NotCarried(_))) => return Err(error.into()),
+            Err(error) if began.elapsed() > RESTART => return Err(error.into()),
+            Err(_) => {}
+        }
+    }
 }
 
 /// Runs `work` with the MC software stopped, and starts it again whatever happens.

@@ -1,7 +1,7 @@
 //! `motionctl linmot pvl`.
 
 use std::fs::File;
-use std::io::{BufReader, BufWriter, Write};
+use std::io::BufReader;
 use std::path::Path;
 
 use linmot::link::Fault;
@@ -15,7 +15,7 @@ use super::connect::connect;
 use super::curve;
 use crate::cli::Global;
 use crate::exit::Exit;
-use crate::output::Output;
+use crate::output::{Output, counted, write_file};
 
 pub(super) fn run(out: &Output, global: &Global, command: &Pvl) -> Result<(), Exit> {
     match command {
@@ -32,8 +32,31 @@ pub(super) fn run(out: &Output, global: &Global, command: &Pvl) -> Result<(), Ex
     }
 }
 
+fn parameters_of(count: usize) -> String {
+    counted(count, "parameter", "parameters")
+}
+
+fn curves_of(count: usize) -> String {
+    counted(count, "curve", "curves")
+}
+
+fn errors_of(count: usize) -> String {
+    counted(count, "error", "errors")
+}
+
 fn open(path: &Path) -> Result<BufReader<File>, Exit> {
     File::open(path).map(BufReader::new).map_err(|error| Exit::file(&path.display().to_string(), &error))
+}
+
+/// A file without errors, from its beginning: what it alone can tell is told before a drive is needed.
+fn checked(path: &Path) -> Result<BufReader<File>, Exit> {
+    let mut file = open(path)?;
+    Summary::of(&mut file)
+        .map_err(TransferError::File)
+        .and_then(|summary| summary.check())
+        .map_err(|error| failed(path, error))?;
+    std::io::Seek::rewind(&mut file).map_err(|error| Exit::file(&path.display().to_string(), &error))?;
+    Ok(file)
 }
 
 fn failed(path: &Path, error: TransferError<LinkError>) -> Exit {
@@ -56,24 +79,23 @@ fn backup(
         return Ok(());
     }
     let mut link = connect(global, drive)?;
-    // A backup that was not completed must not look like one: it gets its name at the end.
-    let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut file = tempfile::NamedTempFile::new_in(directory).map_err(|error| Exit::file(&name, &error))?;
     let bar = out.progress("reading", 0);
-    let mut writer = BufWriter::new(file.as_file_mut());
-    let done = transfer::backup(&mut link, &mut writer, encoding, changed, |progress| {
-        bar.set_position((progress.parameters + progress.setpoints) as u64);
-    })
-    .map_err(|error| failed(path, error))?;
-    writer.flush().map_err(|error| Exit::file(&name, &error))?;
-    drop(writer);
+    let done = write_file(path, |mut file| {
+        transfer::backup(&mut link, &mut file, encoding, changed, |progress| {
+            bar.set_position((progress.parameters + progress.setpoints) as u64);
+        })
+        .map_err(|error| failed(path, error))
+    })?;
     bar.finish_and_clear();
-    file.as_file().sync_all().map_err(|error| Exit::file(&name, &error))?;
-    file.persist(path).map_err(|error| Exit::file(&name, &error))?;
     let Progress { parameters, curves, setpoints, .. } = done;
     let json = json!({ "file": name, "parameters": parameters, "curves": curves, "setpoints": setpoints });
     out.document(json, || {
-        println!("{parameters} parameters and {curves} curves with {setpoints} setpoints written to {name}");
+        println!(
+            "{} and {} with {} written to {name}",
+            parameters_of(parameters),
+            curves_of(curves),
+            counted(setpoints, "setpoint", "setpoints")
+        );
     });
     Ok(())
 }
@@ -85,17 +107,11 @@ fn restore(
     path: &Path,
     delete_curves: bool,
 ) -> Result<(), Exit> {
-    let mut file = open(path)?;
+    let mut file = checked(path)?;
     let options = Options { delete_curves, dry_run: global.dry_run };
     if !global.dry_run {
         out.confirm(global.yes, "Stop the MC software and write parameters and curves to ROM and flash?")?;
     }
-    // What the file alone can tell is told before a drive is needed.
-    Summary::of(&mut file)
-        .map_err(TransferError::File)
-        .and_then(|summary| summary.check())
-        .map_err(|error| failed(path, error))?;
-    std::io::Seek::rewind(&mut file).map_err(|error| Exit::file(&path.display().to_string(), &error))?;
     let mut link = connect(global, drive)?;
     let bar = out.progress("restoring", 0);
     let mut last = Progress::default();
@@ -120,8 +136,10 @@ fn restore(
         let Progress { parameters, written, curves, .. } = last;
         let remedy = if refused { "correct what it refuses and restore again" } else { "the same restore completes it" };
         exit.context(&format!(
-            "incomplete: {parameters} parameters ({written} of them written) and {curves} curves are as in the file, \
-             curves in RAM only, the MC software may be stopped; {remedy}"
+            "incomplete: {} ({written} of them written) and {} are as in the file, curves in RAM only, the MC \
+             software may be stopped; {remedy}",
+            parameters_of(parameters),
+            curves_of(curves)
         ))
     })?;
     let Progress { parameters, written, curves, setpoints } = done;
@@ -131,13 +149,17 @@ fn restore(
     });
     out.document(json, || {
         let would = if global.dry_run { "would be " } else { "" };
-        println!("{parameters} parameters, {written} of them {would}written; {curves} curves {would}written and saved");
+        println!(
+            "{}, {written} of them {would}written; {} {would}written and saved",
+            parameters_of(parameters),
+            curves_of(curves)
+        );
     });
     Ok(())
 }
 
 fn compare(out: &Output, global: &Global, drive: &Drive, path: &Path) -> Result<(), Exit> {
-    let mut file = open(path)?;
+    let mut file = checked(path)?;
     let mut link = connect(global, drive)?;
     let mut differences = Vec::new();
     let bar = out.progress("comparing", 0);
@@ -157,9 +179,9 @@ fn compare(out: &Output, global: &Global, drive: &Drive, path: &Path) -> Result<
     });
     out.document(document, || {
         lines.iter().for_each(|line| println!("{line}"));
-        println!("{parameters} parameters and {curves} curves are equal");
+        println!("equal: {} and {}", parameters_of(parameters), curves_of(curves));
     });
-    if equal { Ok(()) } else { Err(Exit::check(format!("{} differences", differences.len()))) }
+    if equal { Ok(()) } else { Err(Exit::check(counted(differences.len(), "difference", "differences"))) }
 }
 
 fn describe(difference: &Difference) -> (Value, String) {
@@ -187,7 +209,10 @@ fn describe(difference: &Difference) -> (Value, String) {
         }
         Difference::CurveData { id, first, count } => (
             json!({ "curve": id, "what": "setpoints", "first": first, "count": count }),
-            format!("curve {id}: {count} setpoints differ, the first is number {first}"),
+            match count {
+                1 => format!("curve {id}: setpoint {first} differs"),
+                _ => format!("curve {id}: {count} setpoints differ, the first is number {first}"),
+            },
         ),
         _ => (Value::Null, String::new()),
     }
@@ -233,14 +258,17 @@ fn check(out: &Output, path: &Path) -> Result<(), Exit> {
         for (layer, identity, parameters) in &summary.sections {
             let name = layer.map_or("unknown layer", linmot::upid::Layer::name);
             println!(
-                "{name}: {parameters} parameters, tree {} version {}.{}",
-                identity.tree_id, identity.main_version, identity.sub_version
+                "{name}: {}, tree {} version {}.{}",
+                parameters_of(*parameters),
+                identity.tree_id,
+                identity.main_version,
+                identity.sub_version
             );
         }
-        println!("{} curves, {} errors", summary.curves.len(), summary.errors());
+        println!("{}, {}", curves_of(summary.curves.len()), errors_of(summary.errors()));
     });
     match summary.errors() {
         0 => Ok(()),
-        errors => Err(Exit::check(format!("{}: {errors} errors", path.display()))),
+        errors => Err(Exit::check(format!("{}: {}", path.display(), errors_of(errors)))),
     }
 }

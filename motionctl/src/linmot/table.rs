@@ -5,7 +5,7 @@ use std::path::Path;
 
 use linmot::link::LinkExt;
 use linmot::request::Request;
-use linmot::table::{ENTRIES, Entry, LinkFault, Presence, check_links};
+use linmot::table::{ENTRIES, Entry, EntryError, LinkFault, Presence, check_links};
 use serde_json::{Value, json};
 
 use super::cli::{Drive, Table};
@@ -13,7 +13,7 @@ use super::connect::{AnyLink, connect};
 use super::{stopped, text};
 use crate::cli::Global;
 use crate::exit::Exit;
-use crate::output::Output;
+use crate::output::{Output, counted, write_beside};
 
 type Entries = BTreeMap<u16, Entry>;
 
@@ -69,6 +69,10 @@ pub(super) fn run(out: &Output, global: &Global, command: &Table) -> Result<(), 
     }
 }
 
+fn entries_of(entries: &Entries) -> String {
+    counted(entries.len(), "entry", "entries")
+}
+
 fn read(out: &Output, link: &mut AnyLink) -> Result<Entries, Exit> {
     let presence = link.presence()?;
     let bar = out.progress("reading", presence.iter().count());
@@ -93,7 +97,12 @@ fn parse(raw: &str) -> Result<Entry, String> {
     let bytes: Option<Vec<u8>> =
         (0..digits.len()).step_by(2).map(|at| u8::from_str_radix(digits.get(at..at + 2)?, 16).ok()).collect();
     let bytes = bytes.ok_or_else(|| format!("hex digits in pairs expected, {} found", digits.len()))?;
-    Entry::parse(&bytes).map_err(|error| error.to_string())
+    Entry::parse(&bytes).map_err(|error| match error {
+        EntryError::Version(_) => {
+            format!("{} at the beginning, 01A7 (version A701h) expected", hex(&bytes[..2]))
+        }
+        other => other.to_string(),
+    })
 }
 
 fn to_json(number: u16, entry: &Entry) -> Value {
@@ -166,7 +175,7 @@ fn check(out: &Output, entries: &Entries) -> Result<(), Exit> {
         .collect();
     out.document(json!({ "entries": entries.len(), "faults": json }), || {
         found.iter().for_each(|fault| println!("{fault}"));
-        println!("{} entries, {} faults", entries.len(), found.len());
+        println!("{}, {}", entries_of(entries), counted(found.len(), "fault", "faults"));
     });
     // A loop may be what the machine is meant to do; a missing entry never is.
     match found.iter().find(|fault| matches!(fault, LinkFault::Missing { .. })) {
@@ -179,7 +188,7 @@ fn backup(out: &Output, global: &Global, drive: &Drive, path: &Path) -> Result<(
     let entries = read(out, &mut connect(global, drive)?)?;
     let name = path.display().to_string();
     if global.dry_run {
-        out.say(&format!("would write {} entries to {name}", entries.len()));
+        out.say(&format!("would write {} to {name}", entries_of(&entries)));
         return Ok(());
     }
     let mut document = toml_edit::DocumentMut::new();
@@ -197,9 +206,9 @@ fn backup(out: &Output, global: &Global, drive: &Drive, path: &Path) -> Result<(
         list.push(table);
     }
     document.insert("entry", toml_edit::Item::ArrayOfTables(list));
-    std::fs::write(path, document.to_string()).map_err(|error| Exit::file(&name, &error))?;
+    write_beside(path, document.to_string().as_bytes())?;
     out.document(json!({ "file": name, "entries": entries.len() }), || {
-        println!("{} entries written to {name}", entries.len());
+        println!("{} written to {name}", entries_of(&entries));
     });
     Ok(())
 }
@@ -210,12 +219,17 @@ fn load(path: &Path) -> Result<Entries, Exit> {
     let content = std::fs::read_to_string(path).map_err(|error| Exit::file(&name, &error))?;
     let document: toml_edit::DocumentMut = content.parse().map_err(|error| Exit::file(&name, &error))?;
     if document.get("format").and_then(toml_edit::Item::as_integer) != Some(FORMAT) {
-        return Err(Exit::check(format!("{name}: no command table file: format = {FORMAT} expected")));
+        let found =
+            document.get("format").map_or("nothing".into(), |item| item.to_string().trim().to_owned());
+        return Err(Exit::file(
+            &name,
+            &format!("no command table file: format = {FORMAT} expected, {found} found"),
+        ));
     }
     let mut entries = Entries::new();
     let list = document.get("entry").and_then(toml_edit::Item::as_array_of_tables);
     for (position, table) in (1..).zip(list.into_iter().flatten()) {
-        let wrong = |what: &str| Exit::check(format!("{name}: entry no. {position} of the file: {what}"));
+        let wrong = |what: &str| Exit::file(&name, &format!("entry no. {position} of the file: {what}"));
         let number = table
             .get("entry")
             .and_then(toml_edit::Item::as_integer)
@@ -238,7 +252,7 @@ fn restore(out: &Output, global: &Global, drive: &Drive, path: &Path) -> Result<
         return Err(Exit::check(format!("{}: {fault}", path.display())));
     }
     if global.dry_run {
-        out.say(&format!("would write {} entries to RAM and flash", entries.len()));
+        out.say(&format!("would write {} to RAM and flash", entries_of(&entries)));
         return Ok(());
     }
     out.confirm(global.yes, "Stop the MC software and write the command table to RAM and flash?")?;
@@ -260,11 +274,11 @@ fn restore(out: &Output, global: &Global, drive: &Drive, path: &Path) -> Result<
         Ok(())
     });
     restored.map_err(|exit| {
-        let all = entries.len();
-        exit.context(&format!("{written} of {all} entries were written, the same restore completes it"))
+        let all = entries_of(&entries);
+        exit.context(&format!("{written} of {all} written in RAM, the same restore completes it"))
     })?;
     out.document(json!({ "entries": entries.len(), "saved": true }), || {
-        println!("{} entries written to RAM and flash", entries.len());
+        println!("{} written to RAM and flash", entries_of(&entries));
     });
     Ok(())
 }

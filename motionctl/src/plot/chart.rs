@@ -13,51 +13,43 @@ const TITLE: u32 = 46 * SCALE;
 /// Columns in which a long recording keeps its least and greatest value.
 const COLUMNS: usize = 2000;
 
-/// A line to draw: its name and where it is in a sample.
+/// A line of a recording: its name and where it is in a sample.
 type Line = (&'static str, fn(&Sample) -> Option<f64>);
 
-struct Panel {
-    title: &'static str,
-    unit: &'static str,
-    lines: &'static [Line],
-}
-
-const PANELS: [Panel; 4] = [
-    Panel {
-        title: "position",
-        unit: "units",
-        lines: &[("nominal", |s| s.nominal_position), ("actual", |s| s.position)],
-    },
-    Panel {
-        title: "velocity",
-        unit: "units/s",
-        lines: &[("nominal", |s| s.nominal_velocity), ("actual", |s| s.velocity)],
-    },
-    Panel {
-        title: "acceleration",
-        unit: "units/s²",
-        lines: &[("nominal", |s| s.nominal_acceleration), ("actual", |s| s.acceleration)],
-    },
-    Panel {
-        title: "following error", unit: "units", lines: &[("nominal − actual", |s| s.following_error)]
-    },
+/// Title, unit and lines of the panels of a recording.
+const PANELS: [(&str, &str, &[Line]); 4] = [
+    ("position", "units", &[("nominal", |s| s.nominal_position), ("actual", |s| s.position)]),
+    ("velocity", "units/s", &[("nominal", |s| s.nominal_velocity), ("actual", |s| s.velocity)]),
+    ("acceleration", "units/s²", &[("nominal", |s| s.nominal_acceleration), ("actual", |s| s.acceleration)]),
+    ("following error", "units", &[("nominal − actual", |s| s.following_error)]),
 ];
 
-/// One curve of a panel.
-struct Curve {
-    name: String,
-    points: Vec<(f64, f64)>,
+/// Curves over the same x in one frame.
+#[derive(Debug)]
+pub(crate) struct Panel {
+    /// What is drawn, and in which unit.
+    pub(crate) title: String,
+    pub(crate) curves: Vec<Curve>,
 }
 
-fn curves(panel: &Panel, axes: &[u8], samples: &[Sample]) -> Vec<Curve> {
+/// One curve of a panel.
+#[derive(Debug)]
+pub(crate) struct Curve {
+    /// Empty where it needs none.
+    pub(crate) name: String,
+    /// x and y, x ascending.
+    pub(crate) points: Vec<(f64, f64)>,
+}
+
+fn curves(lines: &[Line], axes: &[u8], samples: &[Sample]) -> Vec<Curve> {
     let mut curves = Vec::new();
     for &axis in axes {
-        for (name, value) in panel.lines {
+        for (name, value) in lines {
             let points = samples.iter().filter(|sample| sample.axis == axis);
             let points: Vec<_> = points.filter_map(|sample| Some((sample.t, value(sample)?))).collect();
             if !points.is_empty() {
                 let name = if axes.len() > 1 { format!("axis {axis}, {name}") } else { (*name).to_string() };
-                curves.push(Curve { name, points: thin(points) });
+                curves.push(Curve { name, points });
             }
         }
     }
@@ -65,9 +57,9 @@ fn curves(panel: &Panel, axes: &[u8], samples: &[Sample]) -> Vec<Curve> {
 }
 
 /// Keeps the least and the greatest value of each of [`COLUMNS`], so that nothing is lost to the eye.
-fn thin(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
+fn thin(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     if points.len() <= 2 * COLUMNS {
-        return points;
+        return points.to_vec();
     }
     let column = points.len().div_ceil(COLUMNS);
     let mut kept = Vec::with_capacity(2 * COLUMNS);
@@ -113,28 +105,37 @@ fn number(value: &f64) -> String {
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 type Failure<'a> = DrawingAreaErrorKind<<SVGBackend<'a> as DrawingBackend>::ErrorType>;
 
-/// The whole drawing.
+/// The drawing of a recording.
 pub(crate) fn svg(title: &str, samples: &[Sample]) -> Result<String, String> {
     let mut axes: Vec<u8> = samples.iter().map(|sample| sample.axis).collect();
     axes.sort_unstable();
     axes.dedup();
-    let panels: Vec<_> = PANELS
-        .iter()
-        .map(|panel| (panel, curves(panel, &axes, samples)))
-        .filter(|(_, curves)| !curves.is_empty())
-        .collect();
-    let time = range(samples.iter().map(|sample| sample.t), 0.0, 0.0);
+    let panels = PANELS.iter().map(|(title, unit, lines)| Panel {
+        title: format!("{title} in {unit}"),
+        curves: curves(lines, &axes, samples),
+    });
+    let panels: Vec<_> = panels.filter(|panel| !panel.curves.is_empty()).collect();
+    drawing(title, "time in s", &panels)
+}
+
+/// Panels one below the other over one x axis, which says `x`.
+pub(crate) fn drawing(title: &str, x: &str, panels: &[Panel]) -> Result<String, String> {
+    let points = panels.iter().flat_map(|panel| &panel.curves).flat_map(|curve| &curve.points);
+    let all = range(points.map(|point| point.0), 0.0, 0.0);
     let mut text = String::new();
     let height = TITLE + PANEL * panels.len() as u32;
-    draw(title, &panels, &time, height, &mut text).map_err(|error| error.to_string())?;
+    draw(title, (x, &all), panels, height, &mut text).map_err(|error| error.to_string())?;
     let size = |scale: u32| format!("width=\"{}\" height=\"{}\"", WIDTH / scale, height / scale);
     Ok(text.replacen(&size(1), &size(SCALE), 1))
 }
 
+/// What the x axis says, and where it begins and ends.
+type Axis<'a> = (&'a str, &'a core::ops::Range<f64>);
+
 fn draw<'a>(
     title: &str,
-    panels: &[(&Panel, Vec<Curve>)],
-    time: &core::ops::Range<f64>,
+    x: Axis<'_>,
+    panels: &[Panel],
     height: u32,
     text: &'a mut String,
 ) -> Result<(), Failure<'a>> {
@@ -142,36 +143,33 @@ fn draw<'a>(
     let root = SVGBackend::with_string(text, (WIDTH, height)).into_drawing_area();
     root.fill(&WHITE)?;
     let rest = root.margin(8 * SCALE, 0, 0, 0).titled(title, ("sans-serif", font))?;
-    for (area, (panel, curves)) in rest.split_evenly((panels.len(), 1)).iter().zip(panels) {
-        draw_panel(area, panel, curves, time)?;
+    for (area, panel) in rest.split_evenly((panels.len(), 1)).iter().zip(panels) {
+        draw_panel(area, panel, x)?;
     }
     root.present()
 }
 
-fn draw_panel<'a>(
-    area: &Area<'a>,
-    panel: &Panel,
-    curves: &[Curve],
-    time: &core::ops::Range<f64>,
-) -> Result<(), Failure<'a>> {
+fn draw_panel<'a>(area: &Area<'a>, panel: &Panel, (x, all): Axis<'_>) -> Result<(), Failure<'a>> {
+    let curves = &panel.curves;
     let values = curves.iter().flat_map(|curve| curve.points.iter().map(|point| point.1));
     // The names of the curves stand above them, over no curve.
-    let values = range(values, 0.06, 0.06 + 0.16 * curves.len() as f64);
+    let names = curves.iter().filter(|curve| !curve.name.is_empty()).count();
+    let values = range(values, 0.06, 0.06 + 0.16 * names as f64);
     let mut chart = ChartBuilder::on(area)
         .margin_left(16 * SCALE)
         .margin_right(24 * SCALE)
         .margin_top(6 * SCALE)
         .x_label_area_size(42 * SCALE)
         .y_label_area_size(104 * SCALE)
-        .build_cartesian_2d(time.clone(), values)?;
+        .build_cartesian_2d(all.clone(), values)?;
     chart
         .configure_mesh()
         .light_line_style(TRANSPARENT)
         .bold_line_style(BLACK.mix(0.2).stroke_width(SCALE))
         .axis_style(BLACK.stroke_width(SCALE))
         .set_all_tick_mark_size(5 * SCALE)
-        .x_desc("time in s")
-        .y_desc(format!("{} in {}", panel.title, panel.unit))
+        .x_desc(x)
+        .y_desc(&panel.title)
         .x_label_formatter(&number)
         .y_label_formatter(&number)
         .label_style(("sans-serif", 13 * SCALE))
@@ -182,9 +180,11 @@ fn draw_panel<'a>(
         let pale = curve.name.ends_with("nominal");
         let style =
             if pale { color.mix(0.45).stroke_width(4 * SCALE) } else { color.stroke_width(2 * SCALE) };
-        chart
-            .draw_series(LineSeries::new(curve.points.iter().copied(), style))?
-            .label(&curve.name)
+        let line = chart.draw_series(LineSeries::new(thin(&curve.points), style))?;
+        if curve.name.is_empty() {
+            continue;
+        }
+        line.label(&curve.name)
             .legend(move |(x, y)| PathElement::new([(x, y), (x + 22 * SCALE as i32, y)], style));
     }
     chart
@@ -217,7 +217,7 @@ mod tests {
     #[test]
     fn a_long_recording_keeps_its_peaks() {
         let points: Vec<_> = (0..100_000).map(|n| (f64::from(n), f64::from(u8::from(n == 77_777)))).collect();
-        let kept = thin(points);
+        let kept = thin(&points);
         assert!(kept.len() <= 2 * COLUMNS && kept.contains(&(77_777.0, 1.0)));
         assert!(kept.is_sorted_by(|a, b| a.0 <= b.0));
     }

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde_json::json;
 
+pub(crate) use chart::{Curve, Panel, drawing};
 pub(crate) use recording::{Recorder, Sample, write};
 
 use crate::exit::Exit;

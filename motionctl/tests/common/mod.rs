@@ -19,15 +19,17 @@ impl Bench {
     }
 
     pub(crate) fn run(&self, arguments: &[&str]) -> Ran {
-        let output = Command::new(env!("CARGO_BIN_EXE_motionctl"))
-            .args(arguments)
-            .current_dir(self.directory.path())
-            .env_remove("MOTIONCTL_PORT")
-            .env_remove("MOTIONCTL_CONFIG")
-            .stdin(Stdio::null())
-            .output()
-            .unwrap();
-        Ran(output)
+        Ran(self.command(arguments).output().unwrap())
+    }
+
+    /// The program with these arguments, without what the environment may say.
+    pub(crate) fn command(&self, arguments: &[&str]) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_motionctl"));
+        command.args(arguments).current_dir(self.directory.path()).stdin(Stdio::null());
+        for name in ["MOTIONCTL_PORT", "MOTIONCTL_CAN", "MOTIONCTL_CONFIG"] {
+            command.env_remove(name);
+        }
+        command
     }
 
     /// A virtual controller on LINE, ready to answer, with its flash in FLASH.

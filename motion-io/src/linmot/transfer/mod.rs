@@ -50,7 +50,11 @@ pub enum TransferError<E> {
 }
 
 fn more(errors: usize) -> String {
-    if errors > 1 { format!(" (and {} errors more)", errors - 1) } else { String::new() }
+    match errors.saturating_sub(1) {
+        0 => String::new(),
+        1 => " (and 1 error more)".into(),
+        more => format!(" (and {more} errors more)"),
+    }
 }
 
 fn join(violations: &[Incompatible]) -> String {
