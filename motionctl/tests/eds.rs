@@ -104,3 +104,22 @@ fn convert_changes_what_it_is_told_and_nothing_else() {
         .ends(2)
         .says("out of range");
 }
+
+/// An EDS has no word for `noAccess`: what gets lost is said.
+#[test]
+fn an_xdd_object_without_access_is_told_when_it_becomes_an_eds() {
+    let bench = Bench::new();
+    let xdd = "<ISO15745ProfileContainer><ISO15745Profile><ProfileBody>\
+        <ApplicationProcess><parameterList><parameter uniqueID=\"P\" access=\"noAccess\"><UDINT/></parameter>\
+        </parameterList></ApplicationProcess><ApplicationLayers><CANopenObjectList>\
+        <CANopenObject index=\"1000\" name=\"Device type\" objectType=\"7\" dataType=\"0007\" accessType=\"ro\"/>\
+        <CANopenObject index=\"2000\" name=\"Speed\" objectType=\"7\" uniqueIDRef=\"P\"/>\
+        </CANopenObjectList></ApplicationLayers></ProfileBody></ISO15745Profile></ISO15745ProfileContainer>";
+    std::fs::write(bench.path("a.xdd"), xdd).unwrap();
+    bench
+        .run(&["eds", "convert", "a.xdd", "b.eds"])
+        .ends(0)
+        .says("not carried over: that 2000h:00 has no access: it is written without AccessType");
+    let text = std::fs::read_to_string(bench.path("b.eds")).unwrap();
+    assert_eq!(text.matches("AccessType=").count(), 1, "{text}");
+}

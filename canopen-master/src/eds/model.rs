@@ -211,6 +211,13 @@ impl Entry {
         self.bytes(self.value.as_deref(), node_id)
     }
 
+    /// The text of the value that the device has after configuration: the configured one, or the default. An
+    /// empty `ParameterValue` configures nothing.
+    pub(crate) fn in_force(&self) -> Option<&str> {
+        let configured = self.value.as_deref().filter(|value| !value.trim().is_empty());
+        configured.or(self.default.as_deref())
+    }
+
     /// Lowest and highest value of an integer; `None` where not given or no number.
     #[must_use]
     pub fn limits(&self, node_id: Option<u8>) -> (Option<i128>, Option<i128>) {

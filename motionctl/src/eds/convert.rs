@@ -137,10 +137,23 @@ fn render(
         return Ok((reading.source.encode(&reading.update(device)), Vec::new()));
     }
     Ok(match format {
-        Format::Eds => (reading.source.encode(&eds::write_eds(device)), Vec::new()),
+        Format::Eds => (reading.source.encode(&eds::write_eds(device)), without_access(device)),
         Format::Xdd => {
             let (text, lost) = eds::write_xdd(device);
             (text.into_bytes(), lost)
         }
     })
+}
+
+/// Entries that nobody may access, as `noAccess` of an XDD says: an EDS has no AccessType for that.
+fn without_access(device: &Device) -> Vec<String> {
+    let entries =
+        device.objects.iter().flat_map(|object| object.entries().iter().map(|entry| (object.index, entry)));
+    entries
+        .filter(|(_, entry)| entry.access.is_none() && entry.data_type.is_some())
+        .map(|(index, entry)| {
+            let sub = entry.subindex;
+            format!("that {index:04X}h:{sub:02X} has no access: it is written without AccessType")
+        })
+        .collect()
 }

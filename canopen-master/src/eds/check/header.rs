@@ -148,8 +148,7 @@ pub(super) fn check(device: &Device, places: &Places<'_>, findings: &mut Finding
     }
     for (subindex, key) in [(1, "VendorNumber"), (2, "ProductNumber"), (3, "RevisionNumber")] {
         let entry = device.entry(0x1018, subindex);
-        let value =
-            entry.and_then(|entry| Number::parse(entry.value.as_deref().or(entry.default.as_deref())?));
+        let value = entry.and_then(|entry| Number::parse(entry.in_force()?));
         if let (Some(info), Some(object)) = (info.number(key), value)
             && info != object.value
         {

@@ -214,4 +214,24 @@ mod tests {
         assert!(found.iter().any(|finding| finding.rule == Rule::LineLength));
         assert!(found.iter().any(|finding| finding.rule == Rule::NameLength));
     }
+
+    /// As editors write it into every DCF: the defaults stay what the device has.
+    #[test]
+    fn an_empty_parameter_value_hides_no_mapping() {
+        let configured = GOOD.replace("PDOMapping=0\n", "PDOMapping=0\nParameterValue=\n");
+        let commissioned = configured
+            + "[DeviceComissioning]\nNodeID=5\nNodeName=n\nBaudrate=500\nNetNumber=1\n\
+            NetworkName=n\nCANopenManager=0\n";
+        let mapping = |text: &str| -> Vec<_> {
+            findings(text).into_iter().filter(|finding| finding.contains("maps")).collect()
+        };
+        assert_eq!(mapping(&commissioned), [""; 0]);
+        let read_only = commissioned.replace("AccessType=rww", "AccessType=ro");
+        let found = mapping(&read_only);
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert!(
+            found[0].contains("1600h:02 maps 20000010h: with its AccessType it goes into TPDOs only"),
+            "{found:?}"
+        );
+    }
 }

@@ -41,8 +41,7 @@ pub(super) fn check(device: &Device, places: &Places<'_>, findings: &mut Finding
 }
 
 fn number(entry: &Entry) -> Option<u32> {
-    let text = entry.value.as_deref().or(entry.default.as_deref())?;
-    u32::try_from(Number::parse(text)?.resolve(None).ok()?).ok()
+    u32::try_from(Number::parse(entry.in_force()?)?.resolve(None).ok()?).ok()
 }
 
 /// Sub-indices and entries of the mapping that are in use.
@@ -68,20 +67,22 @@ fn one(device: &Device, mapped: u32, receive: bool) -> Result<(), alloc::string:
     let Some(entry) = device.entry(index, subindex) else {
         return Err(format!("there is no {index:04X}h:{subindex:02X}"));
     };
-    let direction = match (entry.pdo_mapping, receive) {
-        (None | Some(PdoMapping::No), _) => Some("not at all"),
-        (Some(PdoMapping::Tpdo), true) => Some("into TPDOs only"),
-        (Some(PdoMapping::Rpdo), false) => Some("into RPDOs only"),
+    let refusal = match (entry.pdo_mapping, receive) {
+        (None | Some(PdoMapping::No), _) => Some("its PDOMapping allows none"),
+        (Some(PdoMapping::Tpdo), true) => Some("its PDOMapping allows TPDOs only"),
+        (Some(PdoMapping::Rpdo), false) => Some("its PDOMapping allows RPDOs only"),
         _ => match (entry.access, receive) {
             (Some(Access::ReadOnly | Access::Const | Access::ReadWriteInput), true) => {
-                Some("into TPDOs only")
+                Some("with its AccessType it goes into TPDOs only")
             }
-            (Some(Access::WriteOnly | Access::ReadWriteOutput), false) => Some("into RPDOs only"),
+            (Some(Access::WriteOnly | Access::ReadWriteOutput), false) => {
+                Some("with its AccessType it goes into RPDOs only")
+            }
             _ => None,
         },
     };
-    if let Some(direction) = direction {
-        return Err(format!("it can be mapped {direction}"));
+    if let Some(refusal) = refusal {
+        return Err(refusal.into());
     }
     let length = entry.data_type.and_then(|data_type| length_in_bits(device.base_type(data_type)));
     match length {
