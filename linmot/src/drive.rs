@@ -27,6 +27,19 @@ pub struct Parameter {
     pub default: u32,
 }
 
+impl Parameter {
+    /// Whether a raw value, of which the bits of its type count, lies between minimum and maximum.
+    #[must_use]
+    pub fn takes(&self, raw: u32) -> bool {
+        if self.kind == ParameterType::FLOAT {
+            let [low, value, high] = [self.minimum, raw, self.maximum].map(f32::from_bits);
+            return (low..=high).contains(&value);
+        }
+        let [low, value, high] = [self.minimum, raw, self.maximum].map(|raw| self.kind.number(raw));
+        (low..=high).contains(&value)
+    }
+}
+
 /// Whether an operation is over.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Progress {
@@ -258,6 +271,7 @@ impl Service {
             Request::WriteEntryData { entry, value } => self.entry_word(entry, Some(value), drive),
             Request::GetEntryData { entry } => self.entry_word(entry, None, drive),
             Request::Presence { list } => {
+                let list = list.get();
                 Reply::with_value(Status::OK, u16::from(list) * 4, drive.presence().list(list))
             }
         }
@@ -430,8 +444,7 @@ fn write(drive: &mut impl Drive, memory: Memory, upid: Upid, value: u32) -> Resu
         return Err(Status::USAGE);
     }
     let value = value & parameter.kind.mask();
-    let number = |raw| parameter.kind.number(raw);
-    if !(number(parameter.minimum)..=number(parameter.maximum)).contains(&number(value)) {
+    if !parameter.takes(value) {
         return Err(Status::RANGE);
     }
     if memory != Memory::Ram {

@@ -1,6 +1,7 @@
 //! One command of the configuration module and its answer, whatever carries them (manual B 7.2.1).
 
 use crate::code::{Command, Status};
+use crate::table::ListNumber;
 use crate::upid::{Layer, Upid};
 
 /// Which value of a parameter to read.
@@ -192,8 +193,8 @@ pub enum Request {
     },
     /// 87h…8Eh
     Presence {
-        /// 0…7: entries 32·list and the 31 that follow.
-        list: u8,
+        /// Which of them.
+        list: ListNumber,
     },
 }
 
@@ -265,7 +266,7 @@ impl Request {
             Self::WriteEntryData { .. } => Command::WRITE_ENTRY_DATA,
             Self::GetEntry { .. } => Command::GET_ENTRY,
             Self::GetEntryData { .. } => Command::GET_ENTRY_DATA,
-            Self::Presence { list } => Command(Command::PRESENCE_0.0 + (list & 7)),
+            Self::Presence { list } => Command(Command::PRESENCE_0.0 + list.get()),
         }
     }
 
@@ -355,8 +356,13 @@ impl Request {
             Command::WRITE_ENTRY_DATA => Self::WriteEntryData { entry, value },
             Command::GET_ENTRY => Self::GetEntry { entry },
             Command::GET_ENTRY_DATA => Self::GetEntryData { entry },
-            Command(0x87..=0x8E) => Self::Presence { list: command.0 - Command::PRESENCE_0.0 },
-            _ => return None,
+            Command(id) => match id.checked_sub(Command::PRESENCE_0.0) {
+                Some(list) => match ListNumber::new(list) {
+                    Some(list) => Self::Presence { list },
+                    None => return None,
+                },
+                None => return None,
+            },
         })
     }
 
@@ -439,8 +445,13 @@ pub(crate) mod tests {
         assert_eq!((text.command(), text.words()), (Command(0x74), [0x64, 3, 0]));
         let entry = Request::WriteEntry { entry: 5, size: 64 };
         assert_eq!((entry.command(), entry.words()), (Command(0x83), [5, 64, 0]));
-        assert_eq!(Request::Presence { list: 7 }.command(), Command(0x8E));
-        assert_eq!(Request::parse(Command(0x18), [0; 3]), None);
+        for (list, id) in ListNumber::all().zip(0x87..=0x8E) {
+            let request = Request::Presence { list };
+            assert_eq!((request.command(), request.words()), (Command(id), [0; 3]));
+        }
+        // There is no list behind 8Eh, and none that another number could be taken for.
+        assert_eq!(ListNumber::new(8), None);
+        assert_eq!([0x18, 0x8F, 0xFF].map(|id| Request::parse(Command(id), [0; 3])), [None; 3]);
         for (access, ids) in [
             (Access::Add, [0x50, 0x51, 0x52]),
             (Access::Modify, [0x53, 0x54, 0x55]),

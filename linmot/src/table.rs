@@ -153,6 +153,29 @@ impl Entry {
     }
 }
 
+/// Number of a presence list, 0…7: that of entries 32·n and the 31 that follow.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct ListNumber(u8);
+
+impl ListNumber {
+    /// `None` above 7.
+    #[must_use]
+    pub const fn new(number: u8) -> Option<Self> {
+        if number < LISTS { Some(Self(number)) } else { None }
+    }
+
+    /// 0…7.
+    #[must_use]
+    pub const fn get(self) -> u8 {
+        self.0
+    }
+
+    /// All of them.
+    pub fn all() -> impl Iterator<Item = Self> {
+        (0..LISTS).map(Self)
+    }
+}
+
 /// Which entries exist.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Presence([u32; LISTS as usize]);

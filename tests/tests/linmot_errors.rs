@@ -9,7 +9,7 @@ use std::sync::{Arc, Mutex, MutexGuard};
 use device_sim::can::Node;
 use device_sim::linmot::{CanDrive, Times, VirtualDrive, sg5};
 use linmot::client::{self, Client};
-use linmot::code::Status;
+use linmot::code::{ParameterType, Status};
 use linmot::curve::InfoBlock;
 use linmot::drive::Parameter;
 use linmot::link::{Fault, Link, LinkExt};
@@ -17,7 +17,7 @@ use linmot::linrs::{Checksum, Config, Slave};
 use linmot::module::TPDO;
 use linmot::request::{Access, List, Memory, Reply, Request, Value};
 use linmot::table::Entry;
-use linmot::upid::Upid;
+use linmot::upid::{Upid, Usage};
 use motion_io::can::{CanPort, Event};
 use motion_io::linmot::{LinRsLink, LinkError, PdoLink, SdoLink};
 use motion_io::port::Port;
@@ -309,6 +309,43 @@ fn a_value_that_the_drive_would_cut_off_is_not_written() {
             assert_eq!(bench.link.read(Upid(0x13A0), Value::Ram).unwrap(), 0xFFFB);
             bench.link.write(Upid(0x13A0), Memory::Both, 0).unwrap();
         }
+    }
+}
+
+/// Negative floats descend where their bits ascend; the drive tells no type.
+#[test]
+fn floats_and_ranges_below_zero_are_written_as_what_they_are() {
+    let bits = f32::to_bits;
+    for carrier in CARRIERS {
+        let mut tree = sg5();
+        let like = |upid, kind, minimum, maximum, default| {
+            let usage = Usage::RAM_READ | Usage::ROM_READ | Usage::ROM_WRITE;
+            Parameter { upid: Upid(upid), kind, usage, minimum, maximum, default }
+        };
+        tree.push(like(0x3010, ParameterType::FLOAT, bits(-100.0), bits(100.0), bits(0.0)));
+        tree.push(like(0x3011, ParameterType::S16, -100i16 as u16 as u32, -1i16 as u16 as u32, 0xFFFF));
+        let mut bench = Bench::with(carrier, tree);
+        for value in [-1.0, -0.25, -100.0, 100.0, 0.0] {
+            bench.link.write(Upid(0x3010), Memory::Rom, bits(value)).unwrap();
+            assert_eq!(bench.link.read(Upid(0x3010), Value::Rom).unwrap(), bits(value), "{carrier:?}");
+        }
+        for (upid, raw, words) in [
+            (0x3010, bits(-100.5), "UPID 3010h: -100.5 is out of range, -100 to 100 expected"),
+            (0x3010, bits(f32::NAN), "UPID 3010h: NaN is out of range, -100 to 100 expected"),
+            (0x3011, 0, "UPID 3011h: 0 is out of range, -100 to -1 expected"),
+            (0x3011, 0xFF00, "UPID 3011h: -256 is out of range, -100 to -1 expected"),
+        ] {
+            let fault = bench.link.write(Upid(upid), Memory::Rom, raw).unwrap_err();
+            assert_eq!(fault.to_string(), words, "{carrier:?}");
+            // The drive says the same of it.
+            bench.refuses(
+                Request::Write { memory: Memory::Rom, upid: Upid(upid), value: raw },
+                Status::RANGE,
+                "write ROM value",
+            );
+        }
+        bench.link.write(Upid(0x3011), Memory::Rom, -5i32 as u32).unwrap();
+        assert_eq!(bench.link.read(Upid(0x3011), Value::Rom).unwrap(), 0xFFFB);
     }
 }
 

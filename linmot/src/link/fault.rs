@@ -1,7 +1,7 @@
 //! Why a procedure ended early.
 
 use crate::curve::CurveError;
-use crate::range::Range;
+use crate::range::{Number, Range};
 use crate::request::{Reply, Request, Value};
 use crate::upid::Upid;
 
@@ -46,7 +46,7 @@ pub enum Fault<E> {
         /// The parameter.
         upid: Upid,
         /// What was to be written.
-        value: i64,
+        value: Number,
         /// What the drive takes.
         range: Range,
     },
@@ -58,9 +58,9 @@ pub enum Fault<E> {
         /// Which value was read.
         memory: Value,
         /// What was written.
-        written: i64,
+        written: Number,
         /// What is there.
-        found: i64,
+        found: Number,
     },
     /// A text that no string holds: up to 32 characters without 00h; nothing was written.
     #[error("UPID {upid}: a text of up to 32 characters, none of them 00h, expected, {len} found")]

@@ -10,7 +10,7 @@ use crate::curve::{INFO_SIZE, INFO_WORDS, InfoBlock};
 use crate::drive::LoggedError;
 use crate::range::Range;
 use crate::request::{Access, List, Memory, Reply, Request, Value};
-use crate::table::{ENTRY_SIZE, ENTRY_WORDS, Entry, LISTS, Presence};
+use crate::table::{ENTRY_SIZE, ENTRY_WORDS, Entry, ListNumber, Presence};
 use crate::upid::{Layer, STRINGLETS, TreeIdentity, Upid, Usage};
 
 pub use fault::Fault;
@@ -301,9 +301,9 @@ pub trait LinkExt: Link {
     /// [`Fault::Carrier`], [`Fault::Refused`].
     fn presence(&mut self) -> Result<Presence, Fault<Self::Error>> {
         let mut presence = Presence::default();
-        for list in 0..LISTS {
+        for list in ListNumber::all() {
             let reply = self.ask(Request::Presence { list })?;
-            presence.set_list(list, reply.value());
+            presence.set_list(list.get(), reply.value());
         }
         Ok(presence)
     }

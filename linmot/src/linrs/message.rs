@@ -3,6 +3,7 @@
 use super::frame::Message;
 use crate::code::{Command, Status};
 use crate::request::{Access, List, Memory, Reply, Request, Value};
+use crate::table::ListNumber;
 use crate::upid::Upid;
 
 /// Main ID of the message that carries a command without a message of its own: sub ID = command ID,
@@ -91,7 +92,7 @@ pub fn telegram(id: u8, request: &Request) -> Message {
     let (sub, main) = ids(request);
     let mut words = request.words();
     if let Request::Presence { list } = request {
-        words = [(*list).into(), 0, 0];
+        words = [list.get().into(), 0, 0];
     }
     let carried = if main == TUNNEL { 3 } else { words_carried(request) };
     Message::new(id, sub, main, bytes(words).get(..2 * carried).unwrap_or(&[]))
@@ -130,7 +131,7 @@ pub fn request(message: &Message) -> Option<Request> {
         (TABLE, 0x04) => Request::WriteEntryData { entry, value },
         (TABLE, 0x05) => Request::GetEntry { entry },
         (TABLE, 0x06) => Request::GetEntryData { entry },
-        (TABLE, 0x07) => Request::Presence { list: (first & 7) as u8 },
+        (TABLE, 0x07) => Request::Presence { list: u8::try_from(first).ok().and_then(ListNumber::new)? },
         (TUNNEL, sub) => Request::parse(Command(sub), [first, low, high])?,
         _ => return None,
     })

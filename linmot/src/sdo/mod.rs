@@ -8,6 +8,7 @@ mod client;
 mod server;
 
 use crate::request::{Access as Curve, List, Memory, Request, Value};
+use crate::table::ListNumber;
 use crate::upid::{Layer, Upid};
 
 pub use client::{Aborted, Client};
@@ -271,7 +272,7 @@ impl Access {
             (0x70, false) => Some(Request::ErrorCounts),
             (0x80, true) => Some(Request::SaveTable),
             (0x81, true) => Some(Request::ClearTable),
-            (sub @ 0x87..=0x8E, false) => Some(Request::Presence { list: sub - 0x87 }),
+            (sub @ 0x87..=0x8E, false) => ListNumber::new(sub - 0x87).map(|list| Request::Presence { list }),
             _ => None,
         }
     }

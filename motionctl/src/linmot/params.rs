@@ -3,7 +3,7 @@
 use linmot::code::Status;
 use linmot::link::{Fault, Link, LinkExt};
 use linmot::pvl::Encoding;
-use linmot::range::Range;
+use linmot::range::{Number, Range};
 use linmot::request::{List, Memory, Request, Value};
 use linmot::upid::{Layer, Upid, Usage};
 use serde_json::{Value as Json, json};
@@ -30,8 +30,8 @@ struct Shown {
 }
 
 impl Shown {
-    fn number(&self, raw: u32) -> i64 {
-        self.range.map_or(raw.into(), |range| range.number(raw))
+    fn number(&self, raw: u32) -> Number {
+        self.range.map_or(Number::Integer(raw.into()), |range| range.number(raw))
     }
 }
 
@@ -75,15 +75,16 @@ fn read(link: &mut AnyLink, upid: Upid, usage: Usage, memory: cli::Memory) -> Re
     if memory.ram || !memory.rom && usage.contains(Usage::RAM_READ) {
         shown.ram = Some(link.read(upid, Value::Ram)?);
     }
-    if [shown.rom, shown.ram].into_iter().flatten().any(may_be_negative) {
+    if [shown.rom, shown.ram].into_iter().flatten().any(needs_range) {
         shown.range = Some(link.range(upid)?);
     }
     Ok(shown)
 }
 
-/// Whether a raw value has the sign bit of a type as its highest: only then its range must be known.
-fn may_be_negative(raw: u32) -> bool {
-    matches!(raw.leading_zeros(), 0 | 16 | 24)
+/// Whether a raw value may be another number than an unsigned one, and its range must be known: the sign bit
+/// of a type is its highest, or it is as great as a float's bits are.
+fn needs_range(raw: u32) -> bool {
+    matches!(raw.leading_zeros(), 0..=2 | 16 | 24)
 }
 
 const BOTH: cli::Memory = cli::Memory { ram: false, rom: false, both: true };
@@ -115,8 +116,16 @@ fn list(out: &Output, global: &Global, drive: &Drive, changed: bool) -> Result<(
     Ok(())
 }
 
+/// A float as few digits as tell it from others, not as the digits of a double.
+pub(super) fn of_number(number: Number) -> Json {
+    match number {
+        Number::Integer(number) => json!(number),
+        Number::Float(_) => number.to_string().parse::<f64>().map_or(Json::Null, |value| json!(value)),
+    }
+}
+
 fn to_json(shown: &Shown) -> Json {
-    let number = |value: Option<u32>| value.map(|raw| shown.number(raw));
+    let number = |value: Option<u32>| value.map(|raw| of_number(shown.number(raw)));
     let mut json = json!({
         "upid": shown.upid.0,
         "hex": shown.upid.to_string(),
@@ -156,9 +165,9 @@ fn get(out: &Output, global: &Global, drive: &Drive, upid: Upid, memory: cli::Me
     let mut json = to_json(&shown);
     if let (Some(range), Some(default), Some(json)) = (shown.range, default, json.as_object_mut()) {
         json.extend([
-            ("minimum".to_owned(), json!(range.minimum())),
-            ("maximum".to_owned(), json!(range.maximum())),
-            ("default".to_owned(), json!(range.number(default))),
+            ("minimum".to_owned(), of_number(range.minimum())),
+            ("maximum".to_owned(), of_number(range.maximum())),
+            ("default".to_owned(), of_number(range.number(default))),
         ]);
     }
     out.document(json!({ "parameters": [json] }), || {
@@ -201,7 +210,6 @@ fn set(
     let value = if usage.is_opaque() {
         Wanted::Text(characters(value)?)
     } else {
-        let value = number(value)?;
         let range = link.range(upid).map_err(|fault| Exit::from(fault).context("nothing was written"))?;
         Wanted::Number(raw(upid, value, &range)?, range)
     };
@@ -250,30 +258,34 @@ fn characters(value: &str) -> Result<Vec<u8>, Exit> {
     Ok(bytes)
 }
 
-/// A number as it was typed: hex stands for the raw value.
-enum Typed {
-    Raw(u32),
-    Decimal(i64),
+/// The raw value of what was typed, which the drive will keep as it is: hex stands for the raw value, a decimal
+/// for the number that it is in the parameter's type.
+fn raw(upid: Upid, value: &str, range: &Range) -> Result<u32, Exit> {
+    let (raw, number) = match cli::hex(value).map(|digits| u32::from_str_radix(digits, 16)) {
+        Some(Ok(raw)) => (Some(raw), range.number(raw)),
+        Some(Err(_)) => {
+            return Err(no_number(value, "a number of 32 bits expected, decimal or hex (0x10, 10h)"));
+        }
+        None if range.is_float() => {
+            let number = value.parse::<f32>().ok().filter(|number| number.is_finite());
+            let number =
+                number.ok_or_else(|| no_number(value, "a decimal number expected, or raw in hex"))?;
+            (Some(number.to_bits()), Number::Float(number.to_bits()))
+        }
+        None => {
+            let number = value
+                .parse::<i64>()
+                .map_err(|_| no_number(value, "a number of 32 bits expected, decimal or hex (0x10, 10h)"))?;
+            (range.raw(number), number.into())
+        }
+    };
+    let fault = Fault::<motion_io::linmot::LinkError>::Range { upid, value: number, range: *range };
+    raw.filter(|raw| range.contains(*raw))
+        .ok_or_else(|| Exit::refused(format!("{fault}; nothing was written")))
 }
 
-fn number(value: &str) -> Result<Typed, Exit> {
-    let typed = match cli::hex(value) {
-        Some(digits) => u32::from_str_radix(digits, 16).ok().map(Typed::Raw),
-        None => value.parse().ok().map(Typed::Decimal),
-    };
-    typed.ok_or_else(|| {
-        Exit::usage(format!("{value:?}: a number of 32 bits expected, decimal or hex (0x10, 10h)"))
-    })
-}
-
-/// The raw value, which the drive will keep as it is.
-fn raw(upid: Upid, value: Typed, range: &Range) -> Result<u32, Exit> {
-    let (raw, value) = match value {
-        Typed::Raw(raw) => (Some(raw).filter(|raw| range.contains(*raw)), range.number(raw)),
-        Typed::Decimal(number) => (range.raw(number), number),
-    };
-    let fault = Fault::<motion_io::linmot::LinkError>::Range { upid, value, range: *range };
-    raw.ok_or_else(|| Exit::refused(format!("{fault}; nothing was written")))
+fn no_number(value: &str, expected: &str) -> Exit {
+    Exit::usage(format!("{value:?}: {expected}"))
 }
 
 /// A string is written in pieces: what it is now.

@@ -13,6 +13,7 @@ use serde_json::{Value, json};
 use super::cli::{Drive, EncodingName, Pvl};
 use super::connect::connect;
 use super::curve;
+use super::params::of_number;
 use crate::cli::Global;
 use crate::exit::Exit;
 use crate::output::{Output, counted, write_file};
@@ -189,7 +190,7 @@ fn describe(difference: &Difference) -> (Value, String) {
         Difference::Parameter { upid, file, drive, range } => {
             let [file_number, drive_number] = [file, drive].map(|raw| range.number(raw));
             (
-                json!({ "upid": upid.0, "file": file_number, "drive": drive_number }),
+                json!({ "upid": upid.0, "file": of_number(file_number), "drive": of_number(drive_number) }),
                 format!(
                     "{upid}: {file_number} ({file:08X}h) in the file, {drive_number} ({drive:08X}h) in the drive"
                 ),

@@ -190,9 +190,8 @@ pub fn linmot_drive_ops(data: &[u8]) {
         while slave.poll_transmit(now).is_some() {}
     }
     for parameter in sg5() {
-        let number = |raw| parameter.kind.number(raw);
         let rom = drive.rom(parameter.upid);
-        assert!((number(parameter.minimum)..=number(parameter.maximum)).contains(&number(rom)));
+        assert!(parameter.takes(rom));
         if !parameter.usage.contains(linmot::upid::Usage::ROM_WRITE) {
             assert_eq!(rom, parameter.default);
         }
