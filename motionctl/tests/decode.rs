@@ -408,3 +408,27 @@ fn loop_back_copies_are_counted_apart() {
         "{last}"
     );
 }
+
+/// What a maker's objects are is told once the vendor is known, or given.
+#[test]
+fn objects_of_a_linmot_drive_in_words() {
+    let traffic = "can0 603#4004330100000000\ncan0 583#4304330110270000\n\
+                   can0 603#23A1350690010000\ncan0 583#60A1350600000000\n\
+                   can0 603#2300200B00000000\ncan0 583#6000200B00000000\n\
+                   can0 603#4001207100000000\ncan0 583#8001207100000206\n";
+    let vendor = "can0 603#4018100100000000\ncan0 583#4318100156010000\n";
+    let words = [
+        "can0   node 3    read  3304h:01 UPID 1304h, RAM value = 10000 (2710h)",
+        "can0   node 3    write 35A1h:06 UPID 15A1h, RAM and ROM value = 400 (190h)",
+        "can0   node 3    write 2000h:0B restart of the drive = 00 00 00 00",
+        "can0   node 3    read  2001h:71 error log entry 1, code: REFUSED, object does not exist in the object \
+         dictionary (06020000h)",
+        "",
+        "8 frames: 4 sdo-request, 3 sdo-response, 1 sdo-abort",
+    ];
+    expect_lines(&story(traffic, &["--linmot", "3"]), &words);
+    let learned = story(&format!("{vendor}{traffic}"), &[]);
+    assert!(words[..4].iter().all(|line| learned.contains(line)), "{learned}");
+    let unknown = story(traffic, &[]);
+    assert!(!unknown.contains("UPID"), "{unknown}");
+}

@@ -12,6 +12,9 @@ pub(crate) struct Decode {
     /// EDS or DCF that names a node's objects and says its PDO mapping
     #[arg(long, value_name = "NODE=FILE")]
     pub(crate) eds: Vec<String>,
+    /// A node is a LinMot drive, though the capture does not show its vendor
+    #[arg(long, value_name = "NODE", value_parser = clap::value_parser!(u8).range(1..=127))]
+    pub(crate) linmot: Vec<u8>,
     /// 101h to 10Eh are channels of CAN Link
     #[arg(long)]
     pub(crate) can_link: bool,

@@ -6,6 +6,7 @@
 pub(crate) mod cli;
 mod json;
 mod lb2;
+mod linmot;
 mod names;
 mod story;
 
@@ -142,7 +143,7 @@ impl From<io::Error> for Stop {
 }
 
 pub(crate) fn run(out: &Output, args: &Decode) -> Result<(), Exit> {
-    let names = Names::read(&args.eds)?;
+    let names = Names::read(&args.eds, &args.linmot)?;
     let mut totals = Totals::default();
     let mut stdout = BufWriter::with_capacity(BLOCK, io::stdout().lock());
     let mut decode = || -> Result<(), Stop> {

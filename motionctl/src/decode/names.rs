@@ -1,5 +1,7 @@
 //! Words for objects: from an EDS where one is given, otherwise from the standards (CiA 301, 401, 402).
 
+use core::cell::Cell;
+
 use canopen_master::data_type::{DataType, Value};
 use canopen_master::ds402::{Command, ControlWord, Mode, StatusWord};
 use canopen_master::eds::{self, Device};
@@ -7,12 +9,15 @@ use canopen_master::trace::{Mapped, Tracer};
 use canopen_master::{Address, NodeId, ds402};
 use pdo::CobId;
 
+use super::linmot;
 use crate::exit::Exit;
 
 /// What is known of the nodes' objects.
 #[derive(Debug, Default)]
 pub(super) struct Names {
     devices: Vec<(NodeId, Device)>,
+    /// One bit a node: those that are LinMot drives.
+    linmot: Cell<u128>,
 }
 
 /// Objects of the standards: index, sub-indices, name, type of each sub-index but the number of
@@ -143,8 +148,10 @@ const fn pdo_number(index: u16) -> Option<u16> {
 
 impl Names {
     /// Reads what `--eds NODE=FILE` names.
-    pub(super) fn read(arguments: &[String]) -> Result<Self, Exit> {
+    /// `linmot`: nodes that are drives of LinMot.
+    pub(super) fn read(arguments: &[String], linmot: &[u8]) -> Result<Self, Exit> {
         let mut names = Self::default();
+        names.linmot = Cell::new(linmot.iter().fold(0, |nodes, node| nodes | 1 << (node & 0x7F)));
         for argument in arguments {
             let parts = argument.split_once('=');
             let node = parts.and_then(|(node, _)| NodeId::new(node.trim().parse().ok()?).ok());
@@ -158,6 +165,17 @@ impl Names {
             names.devices.push((node, reading.device));
         }
         Ok(names)
+    }
+
+    /// Takes in the value of an object: who makes a device tells what its objects are.
+    pub(super) fn heard(&self, node: NodeId, at: Address, data: &[u8]) {
+        if at == Address::new(0x1018, 1) && data == linmot::VENDOR.to_le_bytes() {
+            self.linmot.set(self.linmot.get() | 1 << node.raw());
+        }
+    }
+
+    fn is_linmot(&self, node: NodeId) -> bool {
+        self.linmot.get() >> node.raw() & 1 != 0
     }
 
     /// Tells the tracer what the EDS files say about identifiers and mappings.
@@ -196,6 +214,11 @@ impl Names {
                 text.push_str(&format!(", {}", entry.name));
             }
             return text;
+        }
+        if self.is_linmot(node)
+            && let Some(name) = linmot::object(at)
+        {
+            return format!("{text} {name}");
         }
         let Some((_, _, name, _)) = standard(at) else { return text };
         text.push_str(&format!(" {name}"));
@@ -257,6 +280,11 @@ impl Names {
     /// A value in words.
     pub(super) fn words(&self, node: NodeId, at: Address, data: &[u8]) -> String {
         if let Some(words) = special(at, data) {
+            return words;
+        }
+        if self.is_linmot(node)
+            && let Some(words) = linmot::value(at, data)
+        {
             return words;
         }
         let parsed = self.data_type(node, at).and_then(|known| Value::parse(known, data).ok());

@@ -51,6 +51,9 @@ impl Story<'_> {
     /// A transfer that has ended; `remark` stands behind it.
     pub(super) fn tell(&mut self, transfer: &Transfer, bus: Option<&str>, remark: &str) {
         let Transfer { node, at, .. } = *transfer;
+        if transfer.is_done() {
+            self.names.heard(node, at, &transfer.data);
+        }
         let upload = transfer.direction == Direction::Upload;
         let news =
             transfer.is_done() && !transfer.late && self.is_news(transfer.bus, node, at, &transfer.data);
