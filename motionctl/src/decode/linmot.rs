@@ -66,7 +66,7 @@ pub(super) fn object(at: Address) -> Option<String> {
         Request::WriteEntryData { entry, .. } => format!("command table entry {entry}, data to write"),
         Request::GetEntry { entry } => format!("command table entry {entry}, start of reading"),
         Request::GetEntryData { entry } => format!("command table entry {entry}, data"),
-        Request::Presence { list } => format!("presence of command table entries, part {list}"),
+        Request::Presence { list } => format!("presence of command table entries, part {}", list.get()),
         _ => return None,
     })
 }

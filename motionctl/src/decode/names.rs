@@ -150,8 +150,8 @@ impl Names {
     /// Reads what `--eds NODE=FILE` names.
     /// `linmot`: nodes that are drives of LinMot.
     pub(super) fn read(arguments: &[String], linmot: &[u8]) -> Result<Self, Exit> {
-        let mut names = Self::default();
-        names.linmot = Cell::new(linmot.iter().fold(0, |nodes, node| nodes | 1 << (node & 0x7F)));
+        let linmot = Cell::new(linmot.iter().fold(0, |nodes, node| nodes | 1 << (node & 0x7F)));
+        let mut names = Self { devices: Vec::new(), linmot };
         for argument in arguments {
             let parts = argument.split_once('=');
             let node = parts.and_then(|(node, _)| NodeId::new(node.trim().parse().ok()?).ok());
