@@ -123,3 +123,24 @@ fn an_xdd_object_without_access_is_told_when_it_becomes_an_eds() {
     let text = std::fs::read_to_string(bench.path("b.eds")).unwrap();
     assert_eq!(text.matches("AccessType=").count(), 1, "{text}");
 }
+
+/// A file that is no device file: what `check` finds is a finding (1), for everybody else it is trouble with
+/// a file (5), and so it is for a file that is not there.
+#[test]
+fn a_file_that_is_no_device_file_has_one_status_everywhere() {
+    let bench = Bench::new();
+    std::fs::write(bench.path("log"), "can0 701#05\n").unwrap();
+    std::fs::write(bench.path("letter"), "Dear reader,\n").unwrap();
+    std::fs::write(bench.path("other.xml"), "<letter/>").unwrap();
+    std::fs::write(bench.path("empty"), "").unwrap();
+    for name in ["letter", "other.xml", "empty", "nowhere"] {
+        let named = format!("1={name}");
+        let check = if name == "nowhere" { 5 } else { 1 };
+        bench.run(&["eds", "check", name]).ends(check).says(name);
+        bench.run(&["eds", "show", name]).ends(5).says(name);
+        bench.run(&["eds", "convert", name, "out.dcf"]).ends(5).says(name);
+        bench.run(&["decode", "log", "--eds", &named]).ends(5).says(name);
+        bench.run(&["conform", "--can", "virtual:a", "--node", "1", "--eds", name]).ends(5).says(name);
+    }
+    assert!(!bench.path("out.dcf").exists());
+}
