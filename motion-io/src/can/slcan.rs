@@ -244,11 +244,15 @@ impl CanPort for AdapterPort {
     fn receive(&mut self, timeout: Duration) -> io::Result<Option<Event>> {
         let end = self.start.elapsed().saturating_add(timeout);
         loop {
+            // Bytes without meaning may come without end.
+            let left = end.saturating_sub(self.start.elapsed());
+            if self.frames.is_empty() {
+                self.listen(left)?;
+            }
             if let Some(frame) = self.frames.pop_front() {
                 return Ok(Some(Event::Frame(frame)));
             }
-            let left = end.saturating_sub(self.start.elapsed());
-            if self.listen(left)? == 0 && self.start.elapsed() >= end {
+            if left.is_zero() {
                 return Ok(None);
             }
         }
@@ -295,7 +299,10 @@ impl Host {
         };
         // Empty lines end whatever a predecessor left half sent; `C` is refused where the channel is closed.
         host.port.send(b"\r\r\rC\r")?;
-        while host.port.receive(&mut [0; 256], Duration::from_millis(50))? > 0 {}
+        // What still comes of the predecessor's; a line that is no adapter's may never be quiet.
+        let end = host.start.elapsed() + ANSWER;
+        while host.port.receive(&mut [0; 256], Duration::from_millis(50))? > 0 && host.start.elapsed() < end {
+        }
         host.command(&format!("S{code}"))?;
         host.command("O")?;
         Ok(host)
@@ -370,13 +377,14 @@ impl CanPort for Host {
             let mut buffer = [0; 512];
             let left = end.saturating_sub(self.start.elapsed());
             let len = self.port.receive(&mut buffer, left)?;
-            if len == 0 && self.start.elapsed() >= end {
-                return Ok(None);
-            }
             for &byte in buffer.get(..len).unwrap_or(&[]) {
                 if let Some(line) = self.lines.push(byte) {
                     self.line(&line);
                 }
+            }
+            // Bytes without meaning may come without end.
+            if left.is_zero() && self.events.is_empty() {
+                return Ok(None);
             }
         }
     }

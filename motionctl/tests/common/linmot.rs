@@ -12,6 +12,7 @@ pub(crate) const CARRIERS: [(&str, &[&str]); 3] = [
 ];
 
 /// Manual B, figure 13.
+#[allow(dead_code)] // not in every test program
 pub(crate) const CURVE: &str = "# name=Example_Curve length_ms=200 unit=0.1um\n0\n30154\n116978\n250000\n413176\n586824\n750000\n883022\n969846\n1000000\n";
 
 pub(crate) struct Linmot<'a> {
@@ -37,6 +38,7 @@ impl Linmot<'_> {
     }
 }
 
+#[allow(dead_code)] // not in every test program
 pub(crate) fn drive(bench: &Bench, endpoint: &str) -> Controller {
     bench.device(&["sim", "linmot", endpoint, "--state", "FLASH"])
 }
