@@ -13,7 +13,7 @@ use core::time::Duration;
 use std::process::{Child, Stdio};
 use std::sync::Arc;
 use std::thread::JoinHandle;
-use std::time::{Duration as Time, Instant};
+use std::time::Instant;
 
 use common::{Bench, Controller, Ran};
 use linmot::{CARRIERS, Linmot};
@@ -45,11 +45,11 @@ fn begun(bench: &Bench, carrier: &[&str]) -> Child {
     let all = [&["--yes", "--timeout", "0.3", "linmot", "pvl", "restore", "R.pvl"], carrier].concat();
     let mut command = bench.command(&all);
     let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    let limit = Instant::now() + Time::from_secs(60);
+    let limit = Instant::now() + Duration::from_secs(60);
     while std::fs::read(bench.path("FLASH")).unwrap() == before {
         let ended = child.try_wait().unwrap();
         assert!(Instant::now() < limit && ended.is_none(), "nothing was written: {ended:?}");
-        std::thread::sleep(Time::from_millis(1));
+        std::thread::sleep(Duration::from_millis(1));
     }
     child
 }
@@ -151,7 +151,7 @@ fn refuses(bench: &Bench, endpoint: &[&str], name: &str, statuses: &[i32], words
         assert!(ran.stderr().contains(words), "{name}, {command:?}: {}", ran.stderr());
         assert!(!ran.stderr().contains("panicked"), "{name}: {}", ran.stderr());
         assert_eq!(ran.stdout(), "", "{name}: a result of nothing");
-        assert!(began.elapsed() < Time::from_secs(30), "{name}, {command:?}: endless");
+        assert!(began.elapsed() < Duration::from_secs(30), "{name}, {command:?}: endless");
     }
 }
 
@@ -165,7 +165,7 @@ fn peers_that_do_not_speak_linrs_are_named() {
     let peers: [(&str, Answer, &[i32], &str); 8] = [
         ("silent", Box::new(|_| Vec::new()), &[3], "no answer"),
         ("noise", Box::new(move |_| noise(&mut seed)), &[3, 4], "answer"),
-        ("echo", Box::new(|came| came.to_vec()), &[3, 4], "answer"),
+        ("echo", Box::new(<[u8]>::to_vec), &[3, 4], "answer"),
         // Another drive's, another command's, one with a length that no frame has, one that is cut off.
         (
             "other ID",
