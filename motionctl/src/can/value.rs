@@ -155,8 +155,10 @@ pub(crate) fn hex(bytes: &[u8]) -> String {
 
 /// The value of an object's bytes.
 pub(crate) fn decode(data: &[u8], data_type: DataType) -> Result<Json, Exit> {
-    let value = Value::parse(data_type, data)
-        .map_err(|error| Exit::check(format!("the object is no {data_type}: {error}, {} came", hex(data))))?;
+    let value = Value::parse(data_type, data).map_err(|error| {
+        let bytes = if data.is_empty() { String::new() } else { format!(": {}", hex(data)) };
+        Exit::check(format!("the object is no {data_type}: {error}{bytes}"))
+    })?;
     Ok(match value {
         Value::Boolean(value) => json!(value),
         Value::Signed(value) => json!(value),
@@ -191,6 +193,13 @@ mod tests {
         for wrong in ["6041", "0x10000", "0x1018:256", "speed", ""] {
             assert_eq!(address(wrong, None).unwrap_err().status, 2, "{wrong}");
         }
+    }
+
+    #[test]
+    fn an_object_of_another_length_is_told_with_its_bytes_if_it_has_any() {
+        let told = |data: &[u8]| decode(data, DataType::UNSIGNED32).unwrap_err().message;
+        assert_eq!(told(&[]), "the object is no UNSIGNED32: UNSIGNED32 has 4 bytes, 0 came");
+        assert_eq!(told(&[1, 0xAB]), "the object is no UNSIGNED32: UNSIGNED32 has 4 bytes, 2 came: 01AB");
     }
 
     #[test]
