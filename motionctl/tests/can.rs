@@ -143,10 +143,6 @@ fn a_network_of_drive_and_io() {
     assert_eq!((&pdo["id"], &pdo["enabled"], &pdo["transmission"]), (&json!(0x285), &json!(true), &json!(1)));
     assert_eq!(pdo["mapping"][1], json!({ "index": 0x6000, "subindex": 1, "bits": 8 }));
     assert_eq!(bench.can(&["pdo", "read", "5", "tpdo2"], 0), pdo);
-    assert_eq!(
-        bench.can(&["pdo", "write", "5", "tpdo2", "--map", "0x1000:0:32"], 4)["abort_code"],
-        0x0604_0041
-    );
 
     let guard = bench.can(&["guard", "9", "--for", "0.5", "--period", "0.05"], 0);
     assert_eq!((&guard["node"], &guard["event"]), (&json!(9), &json!("lost")));
@@ -156,6 +152,33 @@ fn a_network_of_drive_and_io() {
     std::fs::write(bench.directory.path().join("concise"), concise).unwrap();
     assert_eq!(bench.can(&["dcf", "5", "concise"], 0)["written"], 2);
     assert_eq!(bench.can(&["sdo", "read", "5", "0x1017", "--type", "u16"], 0)["value"], 500);
+}
+
+/// A part that the node refuses leaves the PDO as it was, and that is said.
+#[test]
+fn a_refused_pdo_write_puts_back_what_was() {
+    let mut bench = Bench::new();
+    bench.sim(&["io", "--node", "5"]);
+    let map = ["pdo", "write", "5", "tpdo2", "--map", "0x6401:1:16", "--transmission", "1"];
+    let before = bench.can(&map, 0);
+    let write = |more: &[&str]| bench.run(&[&["pdo", "write", "5", "tpdo2"], more].concat());
+    let refused = [
+        (&["--map", "0x6401:2:16", "0x1000:0:32", "--event", "100"][..], 0x0604_0041, "mapped object 2"),
+        // NMT's identifier: refused when the PDO is to be switched on.
+        (&["--map", "0x6401:2:16", "--id", "0x001", "--transmission", "2"], 0x0609_0030, "switching"),
+    ];
+    for (more, code, what) in refused {
+        let output = write(more);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(4), "{said}");
+        assert!(said.contains(what) && said.contains("the PDO is again as it was before"), "{said}");
+        let document: Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!((&document["abort_code"], &document["left"]), (&json!(code), &json!("restored")));
+        assert_eq!(bench.can(&["pdo", "read", "5", "tpdo2"], 0), before);
+    }
+    // What is not there is noticed before anything is touched.
+    let output = bench.run(&["pdo", "write", "5", "tpdo9", "--transmission", "1"]);
+    assert_eq!(output.status.code(), Some(4));
 }
 
 #[test]

@@ -1,11 +1,16 @@
 //! `motionctl can pdo …`, `can dcf`: how a node is set up.
 
+mod change;
+
 use std::path::Path;
 
 use canopen_master::eds::{self, ConciseEntry};
+use canopen_master::sdo::Outcome;
 use canopen_master::{Address, NodeId};
+use pdo::mapping::MAX_ENTRIES;
 use serde_json::{Value, json};
 
+use self::change::{Failed, Setup, change};
 use super::cli::{CanLine, Pdo};
 use super::sdo::tell;
 use super::session::{Session, node_id};
@@ -57,14 +62,9 @@ impl Access<'_> {
             Ok((data, _)) => {
                 Ok(Some(data.iter().take(4).rev().fold(0, |value, byte| value << 8 | u32::from(*byte))))
             }
-            Err(error) if matches!(error.outcome, canopen_master::sdo::Outcome::Aborted(_)) => Ok(None),
+            Err(error) if matches!(error.outcome, Outcome::Aborted(_)) => Ok(None),
             Err(error) => Err(tell(self.out, error)),
         }
-    }
-
-    fn write(&mut self, index: u16, sub: u8, data: &[u8], what: &str) -> Result<(), Exit> {
-        let written = self.session.download(self.node, Address::new(index, sub), data.to_vec(), false)?;
-        written.map(|_| ()).map_err(|error| tell(self.out, error).context(what))
     }
 }
 
@@ -83,6 +83,11 @@ pub(crate) fn run(out: &Output, global: &Global, command: &Pdo) -> Result<(), Ex
             let map =
                 map.as_ref().map(|map| map.iter().map(|text| entry(text)).collect::<Result<Vec<_>, _>>());
             let map = map.transpose()?;
+            if let Some(map) = &map
+                && map.len() > MAX_ENTRIES
+            {
+                return Err(Exit::usage(format!("--map: {} objects, up to 64 expected", map.len())));
+            }
             let id = id.as_deref().map(identifier).transpose()?;
             if global.dry_run {
                 out.say(&format!("would set {pdo} of node {node} up"));
@@ -91,32 +96,26 @@ pub(crate) fn run(out: &Output, global: &Global, command: &Pdo) -> Result<(), Ex
             let session = Session::open(global, line)?;
             let mut access = Access { out, session, node: node_id(*node)? };
             let cob = access.read(place.communication, 1)?;
-            let cob = id.map_or(cob, |id| cob & !0x1FFF_FFFF | id);
-            // CiA 301, 7.5.2.38: off, count 0, entries, count, on.
-            access.write(place.communication, 1, &(cob | OFF).to_le_bytes(), "switching the PDO off")?;
-            if let Some(number) = transmission {
-                access.write(place.communication, 2, &[*number], "transmission type")?;
-            }
-            if let Some(time) = inhibit {
-                access.write(place.communication, 3, &time.to_le_bytes(), "inhibit time")?;
-            }
-            if let Some(time) = event {
-                access.write(place.communication, 5, &time.to_le_bytes(), "event timer")?;
-            }
-            if let Some(map) = &map {
-                access.write(place.mapping, 0, &[0], "number of mapped objects")?;
-                for (entry, sub) in map.iter().zip(1..) {
-                    access.write(
-                        place.mapping,
-                        sub,
-                        &entry.to_le_bytes(),
-                        &format!("mapped object {sub}"),
-                    )?;
-                }
-                access.write(place.mapping, 0, &[map.len() as u8], "number of mapped objects")?;
-            }
-            if !off {
-                access.write(place.communication, 1, &(cob & !OFF).to_le_bytes(), "switching the PDO on")?;
+            let new = id.map_or(cob, |id| cob & !0x1FFF_FFFF | id);
+            let wanted = Setup {
+                cob: if *off { new | OFF } else { new & !OFF },
+                transmission: *transmission,
+                inhibit: *inhibit,
+                event: *event,
+                mapping: map.map(|map| (map.len() as u8, map)),
+            };
+            let before = access
+                .earlier(place, cob, &wanted)
+                .map_err(|exit| exit.context("reading what is to be changed, which is not touched"))?;
+            let node = access.node;
+            let session = &mut access.session;
+            let mut write = |at, data| Ok(session.download(node, at, data, false)?.map(|_| ()));
+            if let Err(Failed { what, error, left }) = change(&mut write, place, &before, &wanted)? {
+                let mut document = error.json();
+                document["left"] = json!(left.name());
+                out.document(document, || {});
+                let exit = Exit::from(error).context(&what);
+                return Err(Exit { message: format!("{}; {left}", exit.message), ..exit });
             }
             let document = read(&mut access, pdo, place)?;
             out.document(document.clone(), || print(&document));
