@@ -203,6 +203,30 @@ fn a_role_set_over_lb2_is_taken_at_the_next_start() {
     }
 }
 
+/// Who connects a controller that then says nothing is told why.
+#[test]
+fn a_controller_that_is_silent_on_its_bus_says_why() {
+    let bench = Bench::new();
+    let start = |parameters: &str| {
+        let text = format!("[can1]\nendpoint = \"virtual:silent\"\n[parameters]\n{parameters}\n");
+        std::fs::write(bench.path("run.toml"), text).unwrap();
+        bench.run(&["run", "run.toml", "--for", "0.05"]).ends(0)
+    };
+    let quiet = |ran: common::Ran| assert!(!ran.stderr().contains("silent"), "{}", ran.stderr());
+    let slave = "CAN 1 is silent until LSS gives it an address: a slave has that of its first active object \
+                 ([326]) without master bypass ([334]), and there is none";
+    start("300 = \"Slave\"").says(slave);
+    // Bypassed objects are shared with another slave and give no address.
+    start("300 = \"Slave\"\n326 = 1\n334 = 1\n330 = 1\n338 = 1").says(slave);
+    quiet(start("300 = \"Slave\"\n326 = 1"));
+    start("").says("CAN 1 is silent: a master, and none of its objects is active ([326])");
+    quiet(start("326 = 1"));
+    quiet(start("302 = \"Yes\""));
+    let mut sim = Stream::start(&bench, &["sim", "controller", "--can1", "virtual:a", "--set", "300=Slave"]);
+    let ready = sim.wait(&json!({ "event": "ready" }));
+    assert!(ready["remarks"].as_array().unwrap().contains(&json!(slave)), "{ready}");
+}
+
 /// What was expected, what came, which parameter.
 #[test]
 fn wrong_combinations_are_refused_with_a_sentence() {

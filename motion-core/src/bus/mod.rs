@@ -139,6 +139,16 @@ impl CanBus {
         self.role
     }
 
+    /// Its address as a slave: that of its first object without master bypass as it was switched on, or
+    /// what LSS has given it. `None`: it is silent until LSS gives it one, or it is no slave.
+    #[must_use]
+    pub const fn node(&self) -> Option<NodeId> {
+        match &self.engine {
+            Engine::Slave(slave) => slave.node(),
+            Engine::Master(_) | Engine::Link(_) => None,
+        }
+    }
+
     /// The objects in use.
     #[must_use]
     pub const fn settings(&self) -> &Settings {

@@ -170,6 +170,11 @@ fn control(
     for missing in pace::real_time() {
         out.remark(missing);
     }
+    for (at, _) in &connected {
+        if let Some(silent) = controller.bus(*at).and_then(|bus| report::silence(*at, bus)) {
+            out.remark(silent);
+        }
+    }
     let mut report = Report::new(out);
     let mut pace = Pace::new();
     let role = |at: usize| controller.bus(at).map(|bus| (at, bus.role()));

@@ -6,7 +6,7 @@ use canopen_master::NodeSet;
 use canopen_master::scan::BusState;
 use lb2::code::StoredFailure;
 use motion_core::application::{AxisStatus, State};
-use motion_core::bus::{CanBus, Role};
+use motion_core::bus::{CanBus, Role, Settings};
 use motion_core::failure;
 use serde_json::{Value, json};
 
@@ -31,6 +31,23 @@ const fn role_name(role: Role) -> &'static str {
         Role::Master => "master",
         Role::Slave => "slave",
         Role::Link => "can-link",
+    }
+}
+
+/// Why a bus that is connected takes no part in what happens there; `None` if it does.
+pub(super) fn silence(at: usize, bus: &CanBus) -> Option<String> {
+    let Settings { inputs, outputs } = *bus.settings();
+    let unused = inputs.into_iter().chain(outputs).flatten().next().is_none();
+    let (number, types, bypass) = if at == 0 { (1, 326, 334) } else { (2, 358, 366) };
+    match bus.role() {
+        Role::Master if unused => {
+            Some(format!("CAN {number} is silent: a master, and none of its objects is active ([{types}])"))
+        }
+        Role::Slave if bus.node().is_none() => Some(format!(
+            "CAN {number} is silent until LSS gives it an address: a slave has that of its first active object \
+             ([{types}]) without master bypass ([{bypass}]), and there is none"
+        )),
+        _ => None,
     }
 }
 
