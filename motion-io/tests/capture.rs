@@ -436,3 +436,12 @@ fn differences_are_told_from_times() {
         assert_eq!(times(&text), expected, "{text}");
     }
 }
+
+/// Found by fuzzing: eight digits without the flag of an error frame made an error report extended.
+#[test]
+fn an_error_report_has_no_identifier_of_29_bits() {
+    let line = "  can0  00200004   [8]  00 04 00 00 00 00 00 00   ERRORFRAME\n";
+    let content = frame(0x20_0004, false, FrameKind::Error, &[0, 4, 0, 0, 0, 0, 0, 0]);
+    expect(line, &[(None, Some("can0"), None, content)]);
+    assert_eq!(Frame::new(4, true, FrameKind::Error, &[]), Frame::new(4, false, FrameKind::Error, &[]));
+}

@@ -19,6 +19,7 @@ mod name;
 mod objects;
 mod reader;
 mod types;
+mod update;
 mod value;
 mod writer;
 mod xdd;
@@ -39,6 +40,7 @@ pub use writer::write_eds;
 pub use xdd::write_xdd;
 
 use reader::Findings;
+use update::Whole;
 
 /// How a file is written.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Hash)]
@@ -73,15 +75,32 @@ pub struct Reading {
 
 impl Reading {
     /// The file with the changes that make it say what `device` says. Every line that no change
-    /// concerns stays as it is; without a change the text is the file's, to the last blank.
+    /// concerns stays as it is; without a change the text is the file's, to the last blank. Where parts of
+    /// the file contradict each other so that a change in its place would say something else, objects that
+    /// change are written whole, or, as a last resort, the file anew.
     #[must_use]
     pub fn update(&self, device: &Device) -> String {
-        let update = match self.source.format {
-            Format::Eds => writer::update,
-            Format::Xdd => xdd::update,
+        let (text, before) = (&self.source.text, &self.device);
+        if device == before {
+            return text.clone();
+        }
+        let in_place = |whole| Some(update::update(text, before, device, whole));
+        let (anew, tries): (_, [&dyn Fn() -> Option<String>; 2]) = match self.source.format {
+            Format::Eds => {
+                (write_eds(device), [&|| in_place(Whole::ListsDiffer), &|| in_place(Whole::Changed)])
+            }
+            Format::Xdd => (write_xdd(device).0, [&|| xdd::update(text, before, device), &|| None]),
         };
-        update(&self.source.text, &self.device, device)
+        let meant = said(&anew);
+        tries.into_iter().filter_map(|attempt| attempt()).find(|text| said(text) == meant).unwrap_or(anew)
     }
+}
+
+/// What a text says, whatever the order of the keys within its sections.
+fn said(text: &str) -> Option<Device> {
+    let mut device = read_as(text.as_bytes(), Encoding::Utf8).ok()?.device;
+    device.sort_keys();
+    Some(device)
 }
 
 impl Source {

@@ -80,6 +80,13 @@ impl Fields {
         }
     }
 
+    /// Brings the keys into alphabetical order.
+    fn sort(&mut self) {
+        let mut pairs = core::mem::take(self).pairs;
+        pairs.sort();
+        *self = pairs.into_iter().collect();
+    }
+
     /// Keys and values in their order.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = (&str, &str)> {
         self.pairs.iter().map(|(key, value)| (key.as_str(), value.as_str()))
@@ -253,6 +260,11 @@ pub struct Object {
 }
 
 impl Object {
+    fn sort_keys(&mut self) {
+        self.own.other.sort();
+        self.subs.iter_mut().for_each(|entry| entry.other.sort());
+    }
+
     /// An object of which nothing but the index is known.
     #[must_use]
     pub fn new(index: u16) -> Self {
@@ -370,6 +382,19 @@ pub struct Device {
 }
 
 impl Device {
+    /// Brings the keys of every section into alphabetical order, to compare devices regardless of it.
+    pub(crate) fn sort_keys(&mut self) {
+        let parts =
+            [&mut self.file_info, &mut self.device_info, &mut self.commissioning, &mut self.dummy_usage];
+        parts.into_iter().for_each(Fields::sort);
+        for module in &mut self.modules {
+            module.info.sort();
+            module.fixed.iter_mut().chain(&mut module.extends).for_each(Object::sort_keys);
+        }
+        self.objects.iter_mut().for_each(Object::sort_keys);
+        self.other.iter_mut().for_each(|section| section.fields.sort());
+    }
+
     /// The object at an index.
     #[must_use]
     pub fn object(&self, index: u16) -> Option<&Object> {

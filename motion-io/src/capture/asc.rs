@@ -66,7 +66,6 @@ impl Asc {
         match id {
             b"ErrorFrame" => {
                 record.frame.id = 0;
-                record.frame.extended = false;
                 record.frame.kind = FrameKind::Error;
                 record.frame.len = 0;
                 return Some(Parsed::Frame);
@@ -110,7 +109,6 @@ impl Asc {
         let (id, rest) = word(rest)?;
         if id == b"ErrorFrame" {
             record.frame.id = 0;
-            record.frame.extended = false;
             record.frame.kind = FrameKind::Error;
             record.frame.len = 0;
             return Some(Parsed::Frame);

@@ -206,7 +206,6 @@ fn set_id(text: &[u8], record: &mut Record) -> Option<Parsed> {
         }
         (8, Some(id)) if id & ERROR_FLAG != 0 => {
             frame.id = id & (ERROR_FLAG - 1);
-            frame.extended = false;
             frame.kind = FrameKind::Error;
             None
         }

@@ -339,7 +339,7 @@ impl Pcap {
             _ => (Cooked::Other, Err("a packet of a link that is no CAN bus")),
         };
         self.number += 1;
-        let content = content.and_then(|()| if record.frame.fits() { Ok(record) } else { Err(UNFIT) });
+        let content = content.and_then(|()| if record.frame.settle() { Ok(record) } else { Err(UNFIT) });
         Ok(Held { number: self.number, content, cooked, paired: false })
     }
 
@@ -433,9 +433,6 @@ fn socketcan(bytes: &[u8], big: bool, fd: bool, record: &mut Record) -> Result<(
         () if id & REMOTE != 0 => FrameKind::Remote,
         () => FrameKind::Data,
     };
-    if frame.kind == FrameKind::Error {
-        frame.extended = false;
-    }
     frame.len = len;
     if frame.kind == FrameKind::Remote {
         return Ok(());

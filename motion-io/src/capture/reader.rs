@@ -60,7 +60,7 @@ impl TextParser {
             Self::Columns(parser) => parser.line(line, record, buses),
         };
         match parsed {
-            Parsed::Frame if !record.frame.fits() => Parsed::Damaged(UNFIT),
+            Parsed::Frame if !record.frame.settle() => Parsed::Damaged(UNFIT),
             parsed => parsed,
         }
     }

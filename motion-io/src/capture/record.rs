@@ -80,7 +80,7 @@ pub enum FrameKind {
 pub struct Frame {
     /// 11 or 29 bits; of an error report the error class.
     pub id: u32,
-    /// 29-bit identifier.
+    /// 29-bit identifier; never of an error report.
     pub extended: bool,
     /// Kind.
     pub kind: FrameKind,
@@ -101,12 +101,14 @@ impl Frame {
         let mut frame = Self { id, extended, kind, ..Self::EMPTY };
         frame.data.get_mut(..data.len())?.copy_from_slice(data);
         frame.len = u8::try_from(data.len()).ok()?;
-        frame.fits().then_some(frame)
+        frame.settle().then_some(frame)
     }
 
-    /// Whether the length and the identifier are those that such a frame may have.
+    /// Takes the width of the identifier from an error report; whether the length and the identifier are
+    /// those that such a frame may have.
     #[inline]
-    pub(super) fn fits(&self) -> bool {
+    pub(super) fn settle(&mut self) -> bool {
+        self.extended &= self.kind != FrameKind::Error;
         let most = if matches!(self.kind, FrameKind::Fd { .. }) { MAX_DATA } else { 8 };
         let ids = if self.extended || self.kind == FrameKind::Error { 0x1FFF_FFFF } else { 0x7FF };
         usize::from(self.len) <= most && self.id <= ids

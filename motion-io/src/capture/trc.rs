@@ -203,7 +203,6 @@ fn parse(
     }
     let frame = &mut record.frame;
     if kind == FrameKind::Error {
-        frame.extended = false;
         frame.id &= 0x1FFF_FFFF;
     } else if frame.id > if frame.extended { 0x1FFF_FFFF } else { 0x7FF } {
         return Some(Parsed::Damaged("an identifier of 11 or 29 bits expected"));

@@ -119,3 +119,48 @@ const ACCESS: [(&str, Access); 6] = [
     ("readWriteInput", Access::ReadWriteInput),
     ("readWriteOutput", Access::ReadWriteOutput),
 ];
+
+#[cfg(test)]
+mod tests {
+    use alloc::format;
+    use alloc::string::String;
+
+    use super::super::read;
+    use super::*;
+
+    fn file(object: &str, management: &str) -> String {
+        format!(
+            "<ISO15745ProfileContainer xmlns=\"http://www.canopen.org/xml/1.1\"><!-- kept --><ISO15745Profile>\
+             <CANopenObjectList>{object}</CANopenObjectList><NetworkManagement>{management}</NetworkManagement>\
+             </ISO15745Profile></ISO15745ProfileContainer>"
+        )
+    }
+
+    /// Found by fuzzing: blanks that XML takes from such a value made it another one when written.
+    #[test]
+    fn a_truth_value_may_have_blanks_around_it() {
+        let text = file(
+            "<CANopenObject index=\"1000\" name=\"a\" />",
+            "<CANopenMasterFeatures bootUpMaster=\"true \" />",
+        );
+        let device = read(text.as_bytes()).unwrap().device;
+        assert_eq!(device.device_info.get("SimpleBootUpMaster"), Some("1"));
+        assert_eq!(read(write_xdd(&device).0.as_bytes()).unwrap().device, device);
+    }
+
+    /// Found by fuzzing: the first of two such elements was changed, where the second one counts.
+    #[test]
+    fn elements_that_contradict_each_other_are_written_anew() {
+        let object = "<CANopenObject index=\"1000\" name=\"a\" />";
+        let element = |node: u8| format!("<deviceCommissioning nodeID=\"{node}\" />");
+        let (once, twice) = (file(object, &element(2)), file(object, &(element(1) + &element(2))));
+        for (text, keeps_comments) in [(once, true), (twice, false)] {
+            let reading = read(text.as_bytes()).unwrap();
+            let mut changed = reading.device.clone();
+            changed.commissioning.set("NodeID", "3");
+            let updated = reading.update(&changed);
+            assert_eq!(read(updated.as_bytes()).unwrap().device, changed, "{updated}");
+            assert_eq!(updated.contains("kept"), keeps_comments, "{updated}");
+        }
+    }
+}

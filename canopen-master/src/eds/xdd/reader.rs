@@ -183,9 +183,10 @@ fn rows(node: Node<'_, '_>, rows: &[Row], into: &mut Fields) {
 
 /// A value of a header as an EDS has it; as it is where it has not the form expected.
 fn from_xml(text: &str, kind: Kind) -> String {
+    let text = squeeze(text);
     let converted = match kind {
         Kind::Text => None,
-        Kind::Bool => match text {
+        Kind::Bool => match text.as_str() {
             "true" | "1" => Some("1".to_owned()),
             "false" | "0" => Some("0".to_owned()),
             _ => None,
@@ -210,9 +211,9 @@ fn from_xml(text: &str, kind: Kind) -> String {
                 _ => None,
             }
         }
-        Kind::BitRate => bit_rate(text).map(|rate| rate.to_string()),
+        Kind::BitRate => bit_rate(&text).map(|rate| rate.to_string()),
     };
-    converted.unwrap_or_else(|| squeeze(text))
+    converted.unwrap_or(text)
 }
 
 /// Kbit/s of `500 Kbps`, `1 Mbps` or `500`.

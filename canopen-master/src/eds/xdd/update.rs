@@ -8,9 +8,9 @@ use core::ops::Range;
 use roxmltree::{Document, Node};
 
 use super::super::model::{Device, Entry, Object};
+use super::COMMISSIONING;
 use super::reader::{child, container, hex_attribute, is};
 use super::writer::{attributes, escape, put_attribute, put_object, put_sub_object, to_xml};
-use super::{COMMISSIONING, write_xdd};
 
 /// Pieces of the text to replace; an empty range is an insertion.
 #[derive(Default)]
@@ -35,16 +35,9 @@ impl Edits {
     }
 }
 
-/// Changes of objects and of the commissioning go into the text as it is; for any other change the
-/// file is written anew.
-pub(crate) fn update(text: &str, before: &Device, after: &Device) -> String {
-    if before == after {
-        return text.to_string();
-    }
-    edit(text, before, after).unwrap_or_else(|| write_xdd(after).0)
-}
-
-fn edit(text: &str, before: &Device, after: &Device) -> Option<String> {
+/// Changes of objects and of the commissioning go into the text as it is; no other change does. Elements
+/// that contradict each other can make the result say something else.
+pub(crate) fn update(text: &str, before: &Device, after: &Device) -> Option<String> {
     let mut rest = before.clone();
     rest.objects.clone_from(&after.objects);
     rest.commissioning.clone_from(&after.commissioning);
