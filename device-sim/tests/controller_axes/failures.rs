@@ -25,12 +25,17 @@ fn others_stand(rig: &Rig, axis: usize) {
     }
 }
 
-/// After a failure is over: reset, and a move to `position` arrives exactly.
-fn works_again(rig: &mut Rig, axis: usize, position: i32) {
+/// After a failure is over: reset, and a move to `position` arrives.
+fn moves_again(rig: &mut Rig, axis: usize, position: i32) {
     rig.reset(axis);
     rig.until("at standstill", |rig| rig.status(axis).state == State::Standstill);
     rig.until("enabled", |rig| rig.state(axis) == ds402::State::OperationEnabled);
     rig.arrive(axis, position, 327_680);
+}
+
+/// The same, to the increment.
+fn works_again(rig: &mut Rig, axis: usize, position: i32) {
+    moves_again(rig, axis, position);
     rig.until("at rest", |rig| {
         let real = rig.real(axis).floor();
         rig.status(axis).position == position && real == f64::from(position)
@@ -197,6 +202,109 @@ fn fault_of_a_drive() {
     assert_eq!((rig.state(3), rig.failures().len()), (ds402::State::Fault, 1));
     works_again(&mut rig, 3, 0);
     assert_eq!(rig.failures().len(), 1);
+}
+
+/// What an axis is doing when its drive is lost or faulty, in both modes that can drive it.
+#[test]
+fn loss_and_fault_of_a_drive_in_every_motion() {
+    let axis = 2;
+    let at = axis as u16;
+    let orders = [
+        Order::Jog { forward: true, fast: true },
+        Order::MoveAbsolute { position: 1_000_000, velocity: Some(327_680) },
+        Order::Home,
+    ];
+    for mode in [1, 3] {
+        for order in orders {
+            for failure in [DRIVE_LOST, DRIVE_FAULT] {
+                println!("mode {mode}, {order:?}, {failure:?}");
+                let calibration = [(804 + at, 1), (792 + at, 327_680), (798 + at, 327_680)];
+                let ramps = [(600 + at, mode), (894 + at, 50_000)];
+                let mut rig = Rig::enabled(&[&calibration[..], &ramps].concat());
+                let ticket = rig.order(axis, order);
+                rig.run(900 * MS);
+                assert!(rig.drive(axis, |drive| drive.motion().1) > 0.0);
+                if failure == DRIVE_LOST {
+                    rig.plug(axis, false);
+                    rig.until("lost", |rig| rig.status(axis).state == State::ErrorStop);
+                } else {
+                    let now = rig.now();
+                    rig.drives[axis].with_device(now, |drive, context| drive.fail(context, Fault::Motor));
+                    rig.cycle();
+                    rig.cycle();
+                }
+                rig.assert_failed(axis, failure);
+                others_stand(&rig, axis);
+                assert_eq!(rig.progress(axis, ticket), Progress::Failed(MotionError::from_failure(failure)));
+                rig.run(300 * MS);
+                assert_eq!(rig.drive(axis, |drive| drive.motion().1), 0.0);
+                rig.plug(axis, true);
+                rig.run(300 * MS);
+                moves_again(&mut rig, axis, 1_000);
+                assert_eq!(rig.failures().len(), 1);
+            }
+        }
+    }
+}
+
+/// An axis that is switched off and on again knows nothing of the fault that its drive still has: it is told
+/// again, and does not take orders which the drive would catch up with once it is reset.
+#[test]
+fn a_drive_that_is_enabled_in_a_fault_tells_it_again() {
+    let mut rig = Rig::enabled(&[]);
+    let now = rig.now();
+    rig.drives[0].with_device(now, |drive, context| drive.fail(context, Fault::Motor));
+    rig.run(30 * MS);
+    rig.assert_failed(0, DRIVE_FAULT);
+    rig.set_power(false);
+    rig.run(30 * MS);
+    assert_eq!(rig.status(0).state, State::Disabled);
+    rig.set_power(true);
+    rig.run(30 * MS);
+    rig.assert_failed(0, DRIVE_FAULT);
+    assert!(rig.controller.axis(0).unwrap().order(FORWARD).is_err());
+    rig.run(300 * MS);
+    works_again(&mut rig, 0, 1_000);
+}
+
+/// With [744] a drive is enabled by its brake; it is not any more once a failure has brought it to rest.
+#[test]
+fn a_failed_axis_is_not_enabled_at_rest() {
+    let mut rig = Rig::new(&[(744, 20), (696, 300)], Faults::NONE);
+    rig.until("booted", Rig::is_booted);
+    rig.set_power(true);
+    rig.run(100 * MS);
+    rig.order(0, FORWARD);
+    rig.run(600 * MS);
+    assert_eq!(rig.state(0), ds402::State::OperationEnabled);
+    rig.drives[0].with_device(rig.networks[0].now(), |_, context| context.objects.set(0x35B4, 1, 2));
+    rig.until("failed", |rig| rig.status(0).state == State::ErrorStop);
+    rig.run(600 * MS);
+    assert_ne!(rig.state(0), ds402::State::OperationEnabled);
+    rig.reset(0);
+    rig.run(100 * MS);
+    assert_eq!(rig.status(0).state, State::Standstill);
+    assert_ne!(rig.state(0), ds402::State::OperationEnabled);
+}
+
+/// Before its drive has booted an axis can be enabled, and takes no orders; nor if it is not found.
+#[test]
+fn an_axis_without_its_drive_takes_no_orders() {
+    let mut rig = Rig::new(&[], Faults::NONE);
+    rig.plug(1, false);
+    rig.set_power(true);
+    rig.run(12 * MS);
+    let ticket = rig.order(1, FORWARD);
+    rig.cycle();
+    assert_eq!(rig.progress(1, ticket), Progress::Failed(MotionError::from_failure(READING_LOST)));
+    assert_eq!((rig.status(1).state, rig.failures()), (State::Standstill, vec![]));
+    rig.run(2_000 * MS);
+    rig.assert_failed(1, DRIVE_LOST);
+    others_stand(&rig, 1);
+    rig.plug(1, true);
+    assert!(rig.controller.scan(1));
+    rig.until("booted", Rig::is_booted);
+    works_again(&mut rig, 1, 1_000);
 }
 
 /// Axis 1 with a motor on Q1 and an encoder on E1.

@@ -3,5 +3,6 @@
 mod failures;
 mod hour;
 mod limits;
+mod modes;
 mod objects;
 mod rig;

@@ -2,6 +2,7 @@
 
 use device_sim::plant::{Connection, Drive, Incremental, Plant, Sensor, Stepper, Wiring};
 use motion_core::application::Order;
+use motion_core::input::Reading;
 
 use super::bench::{Bench, CONTROL, Route, V_MAX};
 
@@ -34,7 +35,7 @@ fn moves(mut bench: Bench, expected: impl Fn(&Bench, &motion_core::application::
             let before = bench.status();
             bench.cycle();
             let seen = bench.controller.actual_values()[GEAR];
-            assert!(seen.real && seen.failure.is_none());
+            assert!(seen.reading == Reading::Real && seen.failure.is_none());
             assert_eq!(seen.position, geared(expected(&bench, &before)), "at {} ms", bench.now_ms());
             moved += u32::from(seen.velocity != 0);
         }

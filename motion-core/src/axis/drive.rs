@@ -90,15 +90,27 @@ impl Axis {
                 self.close_brake();
             }
             Motion::Position { .. } | Motion::Home(_) | Motion::Velocity { .. } => {}
-            Motion::Idle | Motion::Failed => {}
+            // Nothing controls it until it is reset.
+            Motion::Failed => self.brake = Brake::Closed,
+            Motion::Idle => {}
         }
     }
 
     /// At rest without position control, the brake closes at once; [750] counts from the tolerance
     /// window on.
     pub(super) fn close_brake(&mut self) {
-        if !self.settings.control_in_stop {
+        if !(self.settings.control_in_stop && self.controls_position()) {
             self.brake = Brake::Closed;
+        }
+    }
+
+    /// Whether the mode controls the position of an axis at rest, if [732] or [738] say so: without KSP and
+    /// by signals nothing does.
+    fn controls_position(&self) -> bool {
+        match self.settings.mode {
+            Mode::Control => self.settings.ksp > 0.0,
+            Mode::Ramps => true,
+            Mode::Signals | Mode::None => false,
         }
     }
 
@@ -219,7 +231,7 @@ impl Axis {
             self.motion = Motion::Idle;
             self.nominal = Some(target);
             output.ended = Some(Progress::Done);
-            if !self.settings.control_in_position {
+            if !(self.settings.control_in_position && self.controls_position()) {
                 self.brake = match self.settings.brake_close {
                     0 => Brake::Closed,
                     time => Brake::Closing(time),

@@ -14,6 +14,7 @@ mod watch;
 
 use crate::application::{AxisStatus, MotionError, Progress, State};
 use crate::control::{AxisControl, AxisInput, AxisOutput};
+use crate::input::Reading;
 use crate::output::{Command, Signals};
 use crate::parameters::Values;
 use crate::trajectory::{self, Generator, Goal, Limits};
@@ -85,6 +86,8 @@ pub struct Axis {
     limits: [Option<Failure>; 2],
     /// Actual position of this cycle.
     actual: i32,
+    /// What it stands for.
+    reading: Reading,
     /// Set position at the moment at which the actual one was read.
     set: f64,
     /// Velocity put out last.
@@ -111,6 +114,7 @@ impl Default for Axis {
             drive: None,
             limits: [None; 2],
             actual: 0,
+            reading: Reading::None,
             set: 0.0,
             velocity: 0.0,
         }
@@ -147,7 +151,7 @@ impl AxisControl for Axis {
         self.watch_drive(input.failure, &mut output);
         if self.powered {
             self.watch(input, &mut output);
-            if input.reset && input.failure.is_none() && input.actual.real {
+            if input.reset && input.failure.is_none() && input.actual.reading == Reading::Real {
                 self.acknowledge();
             }
             if let Some(stop) = input.stop {
@@ -180,6 +184,7 @@ impl Axis {
         } else {
             input.actual.position
         };
+        self.reading = input.actual.reading;
         self.homed |= input.actual.calibrated;
         self.held = input.held;
     }

@@ -4,6 +4,8 @@ use super::settings::{Calibration, JogVelocities, Mode};
 use super::{Axis, Home, Motion};
 use crate::application::{MotionError, Order, Progress};
 use crate::control::AxisOutput;
+use crate::failure::READING_LOST;
+use crate::input::Reading;
 use crate::trajectory::Goal;
 
 impl Axis {
@@ -23,11 +25,16 @@ impl Axis {
             return Err(MotionError::NOT_CONFIGURED);
         }
         if let Order::Halt | Order::Stop = order {
-            if self.motion != Motion::Failed {
-                let stop = order == Order::Stop;
-                self.motion = Motion::Braking { stop };
-                (self.nominal, self.at_target) = (None, false);
-                if stop { self.brake_hard() } else { self.brake_softly() }
+            if self.motion == Motion::Failed {
+                return Err(self.error);
+            }
+            let stop = order == Order::Stop;
+            self.motion = Motion::Braking { stop };
+            (self.nominal, self.at_target) = (None, false);
+            if stop {
+                self.brake_hard();
+            } else {
+                self.brake_softly();
             }
             return Ok(());
         }
@@ -36,6 +43,9 @@ impl Axis {
         }
         if self.motion == Motion::Failed && !self.stands() {
             return Err(self.error);
+        }
+        if self.reading == Reading::None {
+            return Err(MotionError::from_failure(READING_LOST));
         }
         match order {
             Order::MoveAbsolute { position, velocity } => self.begin_position(i64::from(position), velocity),

@@ -6,7 +6,8 @@ use super::settings::{Calibration, Mode};
 use super::{Axis, Motion};
 use crate::application::{MotionError, Progress};
 use crate::control::{AxisInput, AxisOutput, PlcStop};
-use crate::failure::{HW_LIMIT_MINUS, HW_LIMIT_PLUS, SW_LIMIT_MINUS, SW_LIMIT_PLUS};
+use crate::failure::{HW_LIMIT_MINUS, HW_LIMIT_PLUS, READING_LOST, SW_LIMIT_MINUS, SW_LIMIT_PLUS};
+use crate::input::Reading;
 
 impl Axis {
     /// Tells a failure of the drive once, also of an axis that is not enabled.
@@ -18,7 +19,7 @@ impl Axis {
 
     /// Failures of drive and input, following error, limit switches: all in the cycle in which they come.
     pub(super) fn watch(&mut self, input: &AxisInput, output: &mut AxisOutput) {
-        if let Some(failure) = input.failure.or(input.actual.failure) {
+        if let Some(failure) = input.failure.or(input.actual.failure).or_else(|| self.blind(output)) {
             let error = MotionError::from_failure(failure);
             if self.motion != Motion::Failed || self.error != error {
                 self.controlled = false;
@@ -43,6 +44,19 @@ impl Axis {
             }
         }
         self.watch_limits(input, output);
+    }
+
+    /// Without an actual value no axis stays enabled that had one, and none moves that had none.
+    fn blind(&self, output: &mut AxisOutput) -> Option<Failure> {
+        match (self.reading, self.motion) {
+            (Reading::Lost, _) => Some(READING_LOST),
+            (Reading::None, Motion::Idle | Motion::Failed) => None,
+            (Reading::None, _) => {
+                output.failure = Some(READING_LOST);
+                output.failure
+            }
+            _ => None,
+        }
     }
 
     pub(super) fn watch_limits(&mut self, input: &AxisInput, output: &mut AxisOutput) {

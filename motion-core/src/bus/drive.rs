@@ -20,6 +20,8 @@ const STALE: Duration = Duration::from_millis(30);
 pub(super) struct Drive {
     control: ds402::Axis,
     enable: bool,
+    /// What the axis wanted last.
+    wanted: bool,
     feedback: Option<(Duration, Feedback)>,
     /// Guarding has lost it, or the bus is away.
     lost: bool,
@@ -121,6 +123,11 @@ impl Drive {
         }
         let warns = self.control.status().is_some_and(|status| status.has(StatusWord::WARNING));
         self.clear |= wanted.reset && warns;
+        let anew = !core::mem::replace(&mut self.wanted, wanted.enable) && wanted.enable;
+        if anew && self.faulty && !wanted.reset {
+            // The axis may have forgotten it since, and must not take it for a drive that moves.
+            self.failure = Some(failure::DRIVE_FAULT);
+        }
         let enable = wanted.enable && !self.lost;
         let goal = if wanted.reset && self.faulty {
             Some(Goal::ResetFault)

@@ -20,8 +20,8 @@ pub enum PlcStop {
 /// What an axis is given in one cycle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AxisInput {
-    /// Actual value. Its `shift` moves the set values alike; `real` is false while there is no reading,
-    /// and `failure` stops the axis. An axis without an input (`[606]` Virtual, Stepper motor) takes
+    /// Actual value. Its `shift` moves the set values alike; `failure` stops the axis, and without a
+    /// `reading` it does not move. An axis without an input (`[606]` Virtual, Stepper motor) takes
     /// `position` as the steps of its motor.
     pub actual: ActualValue,
     /// I1…I4, for the hardware limit switches.

@@ -11,7 +11,7 @@ use lb2::code::{Failure, StoredFailure};
 use crate::Model;
 use crate::application::{Application, AxisAccess, AxisStatus, Plc, Progress};
 use crate::bus::CanBus;
-use crate::input::{self, ActualValue, ActualValueInput, AxisQuantities, Kind, Sources};
+use crate::input::{self, ActualValue, ActualValueInput, AxisQuantities, Kind, Reading, Sources};
 use crate::io::{
     AnalogInputs, DigitalInputs, DigitalOutputs, FieldBus, Inputs, Outputs, ProcessImage, Pwm, Terminal,
 };
@@ -196,7 +196,7 @@ impl<A: AxisControl> Control<A> {
                             .map_or(0, |own| own.steps)
                             .wrapping_sub(self.origins.get(at).copied().unwrap_or(0)),
                         shift: self.shifts.get_mut(at).map_or(0, core::mem::take),
-                        real: true,
+                        reading: Reading::Real,
                         ..ActualValue::default()
                     },
                 },
@@ -287,12 +287,15 @@ impl<A: AxisControl> Control<A> {
         }
     }
 
-    /// Failures of inputs that belong to no axis are the system's.
+    /// Failures of inputs that belong to no axis are the system's; of what Virtual2 takes over, the source
+    /// has told.
     fn log_inputs_without_axis(&self, log: &mut impl FnMut(StoredFailure)) {
         for (at, value) in self.values.iter().enumerate() {
             let used = self.settings.axes.iter().flatten().any(|route| route.is_on(at));
+            let kind = self.inputs.get(at).map(|input| input.settings().kind);
             if let Some(failure) = value.failure
                 && !used
+                && !matches!(kind, Some(Kind::Virtual2 { .. }))
             {
                 log(StoredFailure { axis: 0, failure });
             }

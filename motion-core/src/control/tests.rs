@@ -241,7 +241,7 @@ fn failures_are_logged_with_their_axis() {
     rig.idle();
     let lost = |axis| StoredFailure { axis, failure: failure::READING_LOST };
     assert_eq!(rig.log, [lost(2), lost(0)]);
-    assert!(!rig.last(1).actual.real);
+    assert_eq!(rig.last(1).actual.reading, Reading::Lost);
     rig.idle();
     assert_eq!(rig.log.len(), 2);
 }

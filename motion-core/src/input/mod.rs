@@ -57,6 +57,20 @@ pub struct Sources<'a> {
     pub axes: &'a [AxisQuantities; 6],
 }
 
+/// What an actual value stands for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
+pub enum Reading {
+    /// There has been none yet: an inactive input, or a drive on the CAN bus that has not been there.
+    #[default]
+    None,
+    /// A reading of this cycle.
+    Real,
+    /// Extrapolated by the failure suppression (6.6.1), here or at its source.
+    Extrapolated,
+    /// There is none any more; the failure was told when it began.
+    Lost,
+}
+
 /// What an input gives in one cycle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct ActualValue {
@@ -71,8 +85,8 @@ pub struct ActualValue {
     pub shift: i32,
     /// Whether the reference point was found in this cycle.
     pub calibrated: bool,
-    /// Whether the value stands for a reading; false while it is extrapolated or there is none.
-    pub real: bool,
+    /// What the value stands for.
+    pub reading: Reading,
     /// What failed in this cycle; told once, when it begins.
     pub failure: Option<Failure>,
 }
@@ -189,14 +203,16 @@ impl ActualValueInput {
             failure: None,
             ..self.value
         };
-        if !self.read(sources) {
-            if !self.compensate(sources.cycle) {
+        let reading = self.read(sources);
+        if matches!(reading, Reading::None | Reading::Lost) {
+            if self.lost || !self.compensate(sources.cycle) {
                 self.value.velocity = 0;
                 self.value.frequency = 0;
-                // A drive that has never been there is the bus' affair.
-                let told = self.lost || !self.settled && matches!(self.settings.kind, Kind::Can { .. });
-                self.value.failure = (!told).then_some(failure::READING_LOST);
-                self.lost = true;
+                if self.settled || reading == Reading::Lost {
+                    self.value.reading = Reading::Lost;
+                    let told = core::mem::replace(&mut self.lost, true);
+                    self.value.failure = (!told).then_some(failure::READING_LOST);
+                }
             }
             return self.value;
         }
@@ -219,7 +235,10 @@ impl ActualValueInput {
             self.value.velocity = per_second(i64::from(step));
         }
         self.value.position = position;
-        self.value.real = true;
+        self.value.reading = reading;
+        if self.value.failure.is_none() {
+            self.value.failure = self.source_failure(sources);
+        }
         self.suppressed = 0;
         self.lost = false;
         let step = if core::mem::replace(&mut self.settled, true) { step } else { 0 };
@@ -248,35 +267,47 @@ impl ActualValueInput {
     /// Replaces a reading by extrapolation at the last velocity, for up to `[191]` cycles in a row.
     /// Returns false once the failure is to be taken as real.
     fn compensate(&mut self, cycle: u16) -> bool {
-        self.value.real = false;
+        self.value.reading = Reading::None;
         if !self.settled || self.suppressed >= self.settings.tolerance {
             self.suppressed = 0;
             return false;
         }
+        self.value.reading = Reading::Extrapolated;
         self.suppressed += 1;
         let step = i64::from(self.value.velocity) * i64::from(cycle) / 1000;
         self.value.position = self.value.position.wrapping_add(step as i32);
         true
     }
 
-    /// Takes the reading of this cycle into `count`; false if there is none.
-    fn read(&mut self, sources: &Sources<'_>) -> bool {
+    /// What failed of an input that this one takes over: the axis that goes by it must not go on either.
+    fn source_failure(&self, sources: &Sources<'_>) -> Option<Failure> {
+        match self.settings.kind {
+            Kind::Virtual2 { quantity: Quantity::ActualValue | Quantity::Frequency, source } => {
+                sources.inputs.get(source)?.failure
+            }
+            _ => None,
+        }
+    }
+
+    /// Takes the reading of this cycle into `count`, if there is one.
+    fn read(&mut self, sources: &Sources<'_>) -> Reading {
+        let mut taken = Reading::Real;
         match self.settings.kind {
             Kind::Incremental { encoder, .. } => {
                 let Some(encoder) = sources.encoders.get(encoder).filter(|encoder| !encoder.fault) else {
-                    return false;
+                    return Reading::Lost;
                 };
                 self.follow(encoder.count as u32, 32);
             }
             Kind::Ssi { encoder, ssi } => {
                 let Some(encoder) = sources.encoders.get(encoder).filter(|encoder| !encoder.fault) else {
-                    return false;
+                    return Reading::Lost;
                 };
                 self.follow(ssi.position(encoder.count as u32), ssi.bits());
             }
             Kind::Can { object } => {
                 let Some(position) = object.and_then(|at| sources.can.get(at).copied().flatten()) else {
-                    return false;
+                    return Reading::None;
                 };
                 self.follow(position >> 4, CAN_BITS);
             }
@@ -288,7 +319,11 @@ impl ActualValueInput {
             Kind::Virtual2 { quantity, source } => {
                 let input = sources.inputs.get(source).copied().unwrap_or_default();
                 let axis = sources.axes.get(source).copied().unwrap_or_default();
+                if let Quantity::ActualValue | Quantity::Frequency = quantity {
+                    taken = input.reading;
+                }
                 match quantity {
+                    _ if matches!(taken, Reading::None | Reading::Lost) => {}
                     Quantity::ActualValue => self.follow(input.position as u32, 32),
                     Quantity::Frequency => self.count = i64::from(input.frequency),
                     Quantity::Position => self.follow(axis.position as u32, 32),
@@ -297,11 +332,11 @@ impl ActualValueInput {
                 }
             }
             Kind::Analog { channel, average } => {
-                let Some(channel) = sources.analog.channel(channel) else { return false };
+                let Some(channel) = sources.analog.channel(channel) else { return Reading::Lost };
                 self.count = i64::from(if average { channel.average() } else { channel.reading() });
             }
         }
-        true
+        taken
     }
 
     /// Follows a reading of `bits` bits that wraps: the shorter way round counts. The first reading is

@@ -75,7 +75,7 @@ fn parameter_100_selects_the_source() {
         let mut rig = rig(0, &changes);
         rig.encoders[0].count = 11;
         rig.can[2] = Some(22 << 4);
-        rig.inputs[1].position = 44;
+        rig.inputs[1] = ActualValue { position: 44, reading: Reading::Real, ..ActualValue::default() };
         rig.analog.cycle(10, &[55; CHANNELS]);
         rig.cycle().position
     };
@@ -159,7 +159,8 @@ fn parameter_149_is_the_bits_of_a_turn() {
 fn parameter_156_is_the_quantity_taken_over() {
     let position = |choice| {
         let mut rig = rig(0, &[(100, 4), (156, choice), (163, 3)]);
-        rig.inputs[2] = ActualValue { position: 1, frequency: 2, ..ActualValue::default() };
+        rig.inputs[2] =
+            ActualValue { position: 1, frequency: 2, reading: Reading::Real, ..ActualValue::default() };
         rig.axes[2] = AxisQuantities { position: 3, velocity: 4, steps: 5 };
         rig.cycle().position
     };
@@ -176,6 +177,37 @@ fn parameter_163_is_the_number_of_the_source() {
         }
         assert_eq!(rig.cycle().position, 100 * number);
     }
+}
+
+/// 6.6.1.5: what fails at the source fails here in the same cycle, unless `[191]` compensates it here; what is
+/// extrapolated there is no more here.
+#[test]
+fn virtual2_passes_on_what_its_source_stands_for() {
+    for choice in [0, 1] {
+        let mut rig = rig(0, &[(100, 4), (156, choice), (163, 3)]);
+        let mut seen = |position, reading, failure| {
+            rig.inputs[2] =
+                ActualValue { position, frequency: position, reading, failure, ..ActualValue::default() };
+            let value = rig.cycle();
+            (value.position, value.reading, value.failure)
+        };
+        assert_eq!(seen(0, Reading::None, None), (0, Reading::None, None));
+        assert_eq!(seen(5, Reading::Real, None), (5, Reading::Real, None));
+        assert_eq!(seen(6, Reading::Extrapolated, None), (6, Reading::Extrapolated, None));
+        let jump = Some(failure::ACTUAL_VALUE_JUMP);
+        assert_eq!(seen(900, Reading::Real, jump), (900, Reading::Real, jump));
+        let lost = Some(failure::READING_LOST);
+        assert_eq!(seen(900, Reading::Lost, lost), (900, Reading::Lost, lost));
+        assert_eq!(seen(900, Reading::Lost, None), (900, Reading::Lost, None));
+        assert_eq!(seen(901, Reading::Real, None), (901, Reading::Real, None));
+        // An input that was switched off.
+        assert_eq!(seen(901, Reading::None, None), (901, Reading::Lost, lost));
+    }
+    let mut rig = rig(0, &[(100, 4), (163, 3), (191, 1)]);
+    rig.inputs[2].reading = Reading::Real;
+    rig.cycle();
+    rig.inputs[2].reading = Reading::Lost;
+    assert_eq!((rig.cycle().reading, rig.cycle().reading), (Reading::Extrapolated, Reading::Lost));
 }
 
 /// `[170]`: 1234 counts a second, exact over any number of cycles, both ways.
@@ -210,12 +242,15 @@ fn parameter_191_is_how_long_a_jump_is_compensated() {
         rig.at(10);
         for cycle in 1..=tolerance {
             let value = rig.at(5000);
-            assert_eq!((value.position, value.real, value.failure), (10 + 10 * cycle, false, None));
+            assert_eq!(
+                (value.position, value.reading, value.failure),
+                (10 + 10 * cycle, Reading::Extrapolated, None)
+            );
         }
         let value = rig.at(5000);
         assert_eq!(
-            (value.position, value.real, value.failure),
-            (5000, true, Some(failure::ACTUAL_VALUE_JUMP))
+            (value.position, value.reading, value.failure),
+            (5000, Reading::Real, Some(failure::ACTUAL_VALUE_JUMP))
         );
     }
     // A single bad reading leaves no trace.
@@ -233,13 +268,15 @@ fn a_lost_reading_is_a_failure_of_the_same_cycle() {
     let mut fault = || {
         rig.encoders[0].fault = true;
         let value = rig.cycle();
-        (value.position, value.real, value.failure)
+        (value.position, value.reading, value.failure)
     };
-    assert_eq!(fault(), (20, false, None));
-    assert_eq!(fault(), (20, false, Some(failure::READING_LOST)));
-    assert_eq!(fault(), (20, false, None));
+    assert_eq!(fault(), (20, Reading::Extrapolated, None));
+    assert_eq!(fault(), (20, Reading::Lost, Some(failure::READING_LOST)));
+    for _ in 0..5 {
+        assert_eq!(fault(), (20, Reading::Lost, None), "nothing to extrapolate any more");
+    }
     let back = rig.at(25);
-    assert_eq!((back.position, back.real), (25, true));
+    assert_eq!((back.position, back.reading), (25, Reading::Real));
 }
 
 /// `[198]`: counting is reversed, `floor` still downwards.
@@ -391,16 +428,16 @@ fn parameter_254_is_the_object_of_the_drive() {
         assert_eq!(turns(&mut rig, turn * COUNTS_PER_TURN), turn * COUNTS_PER_TURN);
     }
     rig.set(254, 0);
-    assert!(!rig.cycle().real);
+    assert_eq!(rig.cycle().reading, Reading::None);
 }
 
 /// A drive whose data stop is a failure; one that has never been there is not the input's.
 #[test]
 fn a_drive_without_data_is_told_once_it_had_some() {
     let mut rig = rig(0, &[(100, 2)]);
-    assert_eq!((rig.cycle().failure, rig.cycle().real), (None, false));
+    assert_eq!((rig.cycle().failure, rig.cycle().reading), (None, Reading::None));
     rig.can[2] = Some(0);
-    assert!(rig.cycle().real);
+    assert_eq!(rig.cycle().reading, Reading::Real);
     rig.can[2] = None;
     assert_eq!(rig.cycle().failure, Some(failure::READING_LOST));
 }

@@ -73,7 +73,7 @@ fn a_lost_encoder_brakes_without_feedback() {
     rig.run(500);
     let before = rig.output.command.velocity;
     rig.input.actual.failure = Some(failure::READING_LOST);
-    rig.input.actual.real = false;
+    rig.input.actual.reading = Reading::Lost;
     let output = rig.cycle();
     // The input's failure is stored by whom the input belongs to.
     assert_eq!((output.failure, output.status.state), (None, State::ErrorStop));

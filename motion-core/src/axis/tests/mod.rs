@@ -50,7 +50,7 @@ pub(super) fn rig(changes: &[(u16, i32)]) -> Rig {
         values,
         axis,
         input: AxisInput {
-            actual: ActualValue { real: true, ..ActualValue::default() },
+            actual: ActualValue { reading: Reading::Real, ..ActualValue::default() },
             digital: DigitalInputs::default(),
             power: true,
             held: false,
