@@ -86,6 +86,8 @@ pub(crate) enum Command {
     },
     /// Captures to words, or to JSON objects one a line
     Decode(crate::decode::cli::Decode),
+    /// A bus, a controller or a capture on a screen that lives, or one snapshot of it
+    Monitor(crate::monitor::cli::Monitor),
     /// EDS, DCF, XDD and XDC files
     Eds {
         #[command(subcommand)]

@@ -27,6 +27,7 @@ mod exit;
 mod image;
 mod lb2;
 mod linmot;
+mod monitor;
 mod output;
 mod params;
 mod plot;
@@ -54,6 +55,7 @@ fn main() -> ExitCode {
         Command::Lb2 { command } => lb2::run(&out, &cli.global, &command),
         Command::Linmot { command } => linmot::run(&out, &cli.global, &command),
         Command::Params { command } => params::run(&out, &cli.global, &command),
+        Command::Monitor(args) => monitor::run(&out, &cli.global, &args),
         Command::Decode(args) => decode::run(&out, &args),
         Command::Eds { command } => eds::run(&out, cli.global.dry_run, &command),
         Command::Completions { shell } => {

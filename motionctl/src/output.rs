@@ -18,19 +18,23 @@ pub(crate) const SCHEMA_VERSION: u32 = 1;
 pub(crate) struct Output {
     pub(crate) json: bool,
     quiet: bool,
-    color: bool,
+    color: Color,
     /// Remarks go into the next document, or to standard error.
     remarks: RefCell<Vec<String>>,
 }
 
 impl Output {
     pub(crate) fn new(global: &Global) -> Self {
-        let color = match global.color {
+        Self { json: global.json, quiet: global.quiet, color: global.color, remarks: RefCell::default() }
+    }
+
+    /// Whether there are to be colours, on what is a terminal or is not.
+    pub(crate) fn colors(&self, terminal: bool) -> bool {
+        match self.color {
             Color::Always => true,
             Color::Never => false,
-            Color::Auto => std::env::var_os("NO_COLOR").is_none() && std::io::stderr().is_terminal(),
-        };
-        Self { json: global.json, quiet: global.quiet, color, remarks: RefCell::default() }
+            Color::Auto => terminal && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty()),
+        }
     }
 
     /// The one document of a command: JSON, or what `text` prints.
@@ -72,7 +76,8 @@ impl Output {
     }
 
     pub(crate) fn failed(&self, exit: &Exit) {
-        let (red, plain) = if self.color { ("\x1b[31m", "\x1b[0m") } else { ("", "") };
+        let (red, plain) =
+            if self.colors(std::io::stderr().is_terminal()) { ("\x1b[31m", "\x1b[0m") } else { ("", "") };
         eprintln!("{red}error:{plain} {}", exit.message);
     }
 

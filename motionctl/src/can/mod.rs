@@ -6,7 +6,7 @@ mod link;
 mod lss;
 mod network;
 mod pdo;
-mod record;
+pub(crate) mod record;
 mod sdo;
 pub(crate) mod session;
 pub(crate) mod sim;

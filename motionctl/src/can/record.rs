@@ -35,8 +35,8 @@ fn format_of(path: &Path) -> Result<WriteFormat, Exit> {
     }
 }
 
-/// A frame of the bus, now.
-fn record(frame: &pdo::Frame) -> Option<Record> {
+/// A frame of the bus as a capture has it.
+pub(crate) fn recorded(frame: &pdo::Frame, time: Time) -> Option<Record> {
     let (id, extended) = match frame.id() {
         embedded_can::Id::Standard(id) => (u32::from(id.as_raw()), false),
         embedded_can::Id::Extended(id) => (id.as_raw(), true),
@@ -46,9 +46,13 @@ fn record(frame: &pdo::Frame) -> Option<Record> {
     } else {
         Frame::new(id, extended, FrameKind::Data, frame.data())
     }?;
+    Some(Record { time: Some(time), ..Record::new(frame) })
+}
+
+/// The time of day, to the microsecond.
+fn now() -> Time {
     let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
-    let time = i64::try_from(now.as_nanos() / 1000 * 1000).ok().map(Time);
-    Some(Record { time, ..Record::new(frame) })
+    Time(i64::try_from(now.as_nanos() / 1000 * 1000).unwrap_or(i64::MAX))
 }
 
 pub(super) fn run(
@@ -78,7 +82,7 @@ pub(super) fn run(
         }
         match port.receive(left.min(STEP)).map_err(|error| gone(&error))? {
             Some(Event::Frame(frame)) => {
-                if let Some(record) = record(&frame) {
+                if let Some(record) = recorded(&frame, now()) {
                     writer.write(&record, None).map_err(trouble)?;
                     frames += 1;
                 }

@@ -169,7 +169,7 @@ pub(crate) fn node_id(raw: u8) -> Result<NodeId, Exit> {
 }
 
 /// The endpoint does not answer any more.
-pub(super) fn gone(error: &std::io::Error) -> Exit {
+pub(crate) fn gone(error: &std::io::Error) -> Exit {
     Exit::trouble(format!("the endpoint failed: {error}"))
 }
 

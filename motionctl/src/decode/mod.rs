@@ -1,25 +1,25 @@
 //! `motionctl decode`: captures to words, or to JSON objects one a line.
 //!
-//! `json` writes frames and transfers as the contract of `decode --json` says, `story` tells what
-//! happened, `lb2` does both for LB2 lines, `names` has the words for objects.
+//! `hear` understands the frames, `json` writes frames and transfers as the contract of `decode --json`
+//! says, `story` tells what happened, `lb2` does both for LB2 lines, `names` has the words for objects.
 
 pub(crate) mod cli;
+mod hear;
 mod json;
 mod lb2;
 mod linmot;
-mod names;
-mod story;
+pub(crate) mod names;
+pub(crate) mod story;
 
 use std::io::{self, BufWriter, Read, Write};
 
-use canopen_master::trace::{Kind, Tracer, Transfer};
-use motion_io::capture::{
-    Capture, CaptureError, Damage, FrameKind, Item, Reader, Record, Time, Times, open, open_as,
-};
+use canopen_master::trace::Kind;
+use motion_io::capture::{Capture, CaptureError, Damage, FrameKind, Item, Reader, open, open_as};
 
 use crate::exit::Exit;
 use crate::output::Output;
 use cli::Decode;
+pub(crate) use hear::{Ear, Teller, number_of};
 use json::Json;
 use names::Names;
 use story::Story;
@@ -98,26 +98,14 @@ impl Totals {
     }
 }
 
+/// What of each kind was counted; copies are not.
+pub(crate) fn counted_kinds(totals: &Totals) -> impl Iterator<Item = (&'static str, u64)> {
+    named(&totals.by_kind)
+}
+
 /// Names with what was counted of them.
 fn named(counts: &[u64; NAMES.len()]) -> impl Iterator<Item = (&'static str, u64)> {
     NAMES.into_iter().zip(*counts).filter(|(_, count)| *count > 0)
-}
-
-/// The number of a frame's bus; frames of a capture without buses are on one of their own.
-fn number_of(record: &Record) -> u16 {
-    record.bus.map_or(u16::MAX, |bus| bus.0)
-}
-
-/// Says what a frame is, to a machine or to a person.
-trait Teller {
-    /// The times of the capture are differences. Before the first frame.
-    fn deltas(&mut self) {}
-    /// One frame. FD frames and error reports are of an unknown kind. `time` has differences added up.
-    fn frame(&mut self, record: &Record, time: Option<Time>, bus: Option<&str>, kind: &Kind, tracer: &Tracer);
-    /// A transfer that has ended. `given` is the time of its last frame as the capture has it.
-    fn transfer(&mut self, transfer: &Transfer, given: Option<Time>, bus: Option<&str>);
-    /// What is written so far.
-    fn text(&mut self) -> &mut Vec<u8>;
 }
 
 /// How the work ends early.
@@ -190,15 +178,13 @@ fn decode_file(
             if let Some(times) = args.times {
                 reader.set_times(times.into());
             }
-            let mut tracer = Tracer::new();
-            tracer.set_can_link(args.can_link);
-            names.teach(&mut tracer);
+            let mut ear = Ear::new(names, args.can_link);
             if out.json {
-                decode_can(file, reader, &mut tracer, &mut Json::new(names), totals, stdout)
+                decode_can(file, reader, &mut ear, &mut Json::new(names), totals, stdout)
             } else {
                 let mut story = Story::new(names, args.frames);
-                decode_can(file, reader, &mut tracer, &mut story, totals, stdout)?;
-                story.end(&tracer);
+                decode_can(file, reader, &mut ear, &mut story, totals, stdout)?;
+                story.end(ear.tracer());
                 Ok(stdout.write_all(story.text())?)
             }
         }
@@ -208,13 +194,11 @@ fn decode_file(
 fn decode_can<R: Read>(
     file: &str,
     mut reader: Reader<R>,
-    tracer: &mut Tracer,
+    ear: &mut Ear,
     teller: &mut impl Teller,
     totals: &mut Totals,
     stdout: &mut impl Write,
 ) -> Result<(), Stop> {
-    let mut buses: Vec<Option<String>> = Vec::new();
-    let (mut deltas, mut sum) = (false, 0_i64);
     loop {
         match reader.next().map_err(|error| Exit::file(file, &error))? {
             None => break,
@@ -225,60 +209,16 @@ fn decode_can<R: Read>(
             }
             Some(Item::Frame(_)) => {}
         }
-        if !core::mem::replace(&mut deltas, reader.times() == Times::Deltas) && deltas {
-            teller.deltas();
-        }
-        let record = reader.record();
-        if let Some(bus) = record.bus
-            && buses.len() <= usize::from(bus.0)
-        {
-            buses.resize(usize::from(bus.0) + 1, None);
-            if let Some(slot) = buses.last_mut() {
-                *slot = reader.bus_name(bus).map(str::to_owned);
-            }
-        }
-        let name = |bus: u16| buses.get(usize::from(bus)).and_then(Option::as_deref);
-        let bus = number_of(record);
-        let time = match record.time {
-            Some(Time(since_the_one_before)) if deltas => {
-                sum = sum.saturating_add(since_the_one_before);
-                Some(Time(sum))
-            }
-            time => time,
-        };
-        let now = time.filter(|time| time.0 >= 0).map(Time::since_zero);
-        let kind = match record.frame.classic() {
-            Some(frame) if record.loopback => tracer.look(bus, frame),
-            Some(frame) => tracer.handle_frame(now, bus, frame),
-            None => Kind::Unknown,
-        };
-        totals.count(name_of(record.frame.kind, &kind), record.loopback);
-        teller.frame(record, time, name(bus), &kind, tracer);
-        while let Some(transfer) = tracer.poll_event() {
-            let given = match deltas {
-                true => record.time.filter(|_| transfer.ended == now),
-                false => ended(&transfer),
-            };
-            teller.transfer(&transfer, given, name(transfer.bus));
-        }
+        ear.hear_next(&reader, teller, totals);
         if teller.text().len() >= BLOCK {
             stdout.write_all(teller.text())?;
             teller.text().clear();
         }
     }
-    tracer.finish();
-    while let Some(transfer) = tracer.poll_event() {
-        let bus = buses.get(usize::from(transfer.bus)).and_then(Option::as_deref);
-        teller.transfer(&transfer, ended(&transfer).filter(|_| !deltas), bus);
-    }
+    ear.finish(teller);
     stdout.write_all(teller.text())?;
     teller.text().clear();
     Ok(())
-}
-
-/// Time of a transfer's last frame.
-fn ended(transfer: &Transfer) -> Option<Time> {
-    transfer.ended.and_then(|time| i64::try_from(time.as_nanos()).ok()).map(Time)
 }
 
 /// A line that gave no frame, on standard error.

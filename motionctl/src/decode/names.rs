@@ -14,7 +14,7 @@ use crate::exit::Exit;
 
 /// What is known of the nodes' objects.
 #[derive(Debug, Default)]
-pub(super) struct Names {
+pub(crate) struct Names {
     devices: Vec<(NodeId, Device)>,
     /// One bit a node: those that are LinMot drives.
     linmot: Cell<u128>,
@@ -149,7 +149,7 @@ const fn pdo_number(index: u16) -> Option<u16> {
 impl Names {
     /// Reads what `--eds NODE=FILE` names.
     /// `linmot`: nodes that are drives of LinMot.
-    pub(super) fn read(arguments: &[String], linmot: &[u8]) -> Result<Self, Exit> {
+    pub(crate) fn read(arguments: &[String], linmot: &[u8]) -> Result<Self, Exit> {
         let linmot = Cell::new(linmot.iter().fold(0, |nodes, node| nodes | 1 << (node & 0x7F)));
         let mut names = Self { devices: Vec::new(), linmot };
         for argument in arguments {
@@ -179,7 +179,7 @@ impl Names {
     }
 
     /// Tells the tracer what the EDS files say about identifiers and mappings.
-    pub(super) fn teach(&self, tracer: &mut Tracer) {
+    pub(crate) fn teach(&self, tracer: &mut Tracer) {
         for (node, device) in &self.devices {
             for object in device.objects.iter().filter(|object| (0x1000..=0x1BFF).contains(&object.index)) {
                 for entry in object.entries() {
@@ -203,7 +203,7 @@ impl Names {
     }
 
     /// The object in words: `6041h:00 status word`.
-    pub(super) fn object(&self, node: NodeId, at: Address) -> String {
+    pub(crate) fn object(&self, node: NodeId, at: Address) -> String {
         let (index, sub) = (at.index, at.sub);
         let mut text = format!("{index:04X}h:{sub:02X}");
         if let Some((_, device)) = self.devices.iter().find(|(known, _)| *known == node)
@@ -237,7 +237,7 @@ impl Names {
     }
 
     /// The object's name alone, where it has one.
-    pub(super) fn short(&self, node: NodeId, at: Address) -> String {
+    pub(crate) fn short(&self, node: NodeId, at: Address) -> String {
         let object = self.object(node, at);
         match object.split_once(' ') {
             Some((_, name)) => name.to_owned(),
@@ -267,7 +267,7 @@ impl Names {
     }
 
     /// The bits of an object as a number, negative where its type has a sign.
-    pub(super) fn signed(&self, node: NodeId, at: Address, bits: u8, raw: u64) -> i128 {
+    pub(crate) fn signed(&self, node: NodeId, at: Address, bits: u8, raw: u64) -> i128 {
         use canopen_master::data_type::Kind;
         let signed = matches!(self.data_type(node, at).map(DataType::kind), Some(Kind::Signed(_)));
         if signed && (1..=64).contains(&bits) {
@@ -278,7 +278,7 @@ impl Names {
     }
 
     /// A value in words.
-    pub(super) fn words(&self, node: NodeId, at: Address, data: &[u8]) -> String {
+    pub(crate) fn words(&self, node: NodeId, at: Address, data: &[u8]) -> String {
         if let Some(words) = special(at, data) {
             return words;
         }
@@ -307,7 +307,7 @@ fn quoted(text: &[u8]) -> String {
 }
 
 /// Up to 16 bytes in hex; of more, their number too.
-pub(super) fn bytes(data: &[u8]) -> String {
+pub(crate) fn bytes(data: &[u8]) -> String {
     const MOST: usize = 16;
     let shown: Vec<String> = data.iter().take(MOST).map(|byte| format!("{byte:02X}")).collect();
     match data.len() {

@@ -48,6 +48,11 @@ impl Bench {
 
     /// A virtual device, ready to answer.
     pub(crate) fn device(&self, arguments: &[&str]) -> Controller {
+        self.device_says(arguments).0
+    }
+
+    /// The same, and what it said when it was ready.
+    pub(crate) fn device_says(&self, arguments: &[&str]) -> (Controller, String) {
         let mut child = Command::new(env!("CARGO_BIN_EXE_motionctl"))
             .args(arguments)
             .current_dir(self.directory.path())
@@ -59,7 +64,7 @@ impl Bench {
         let mut line = String::new();
         said.read_line(&mut line).unwrap();
         assert!(line.contains("listening on "), "{line:?}");
-        Controller { child, _said: said }
+        (Controller { child, _said: said }, line)
     }
 }
 

@@ -10,8 +10,9 @@ use std::io::{self, Write};
 use canopen_master::trace::{Direction as TransferDirection, Kind, Mode, Outcome, Tracer, Transfer};
 use motion_io::capture::{FrameKind, Record, Time};
 
+use super::hear::number_of;
 use super::names::Names;
-use super::{Teller, Totals, named, number_of};
+use super::{Teller, Totals, named};
 use fields::{put_mapped, put_tail};
 use text::{Piece, key, put_hex, put_number, put_text, put_time, put_word};
 

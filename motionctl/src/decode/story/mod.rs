@@ -5,6 +5,7 @@
 //! at the end.
 
 mod repeats;
+mod rhythm;
 mod sdo;
 mod words;
 
@@ -18,9 +19,11 @@ use canopen_master::trace::{Kind, Outcome, PdoDirection, Tracer, Transfer};
 use canopen_master::{Address, NodeId, ds402};
 use motion_io::capture::{Frame, FrameKind, Record, Time};
 
+use super::Teller;
+use super::hear::number_of;
 use super::names::{Names, bytes};
-use super::{Teller, number_of};
-use repeats::{Count, Cycle};
+pub(crate) use repeats::{Count, Cycle};
+pub(crate) use rhythm::Rhythm;
 pub(super) use words::summary;
 use words::{date, lss_words};
 
@@ -29,7 +32,7 @@ const VALUES: u32 = 4;
 /// Times from here on are times of day: the story begins at 0.
 const EPOCH: i64 = 100_000_000 * 1_000_000_000;
 
-pub(super) struct Story<'a> {
+pub(crate) struct Story<'a> {
     names: &'a Names,
     every_frame: bool,
     out: Vec<u8>,
@@ -62,7 +65,7 @@ struct Last {
 }
 
 impl<'a> Story<'a> {
-    pub(super) fn new(names: &'a Names, every_frame: bool) -> Self {
+    pub(crate) fn new(names: &'a Names, every_frame: bool) -> Self {
         Self {
             names,
             every_frame,
@@ -76,6 +79,26 @@ impl<'a> Story<'a> {
             silent: BTreeMap::new(),
             last: Last::default(),
         }
+    }
+
+    /// What repeats itself, so far.
+    pub(crate) const fn cycles(&self) -> &BTreeMap<Cycle, Count> {
+        &self.cycles
+    }
+
+    /// The state that a drive's status word last showed.
+    pub(crate) fn drive(&self, bus: u16, node: NodeId) -> Option<ds402::State> {
+        self.drives.get(&(bus, node)).copied()
+    }
+
+    /// Guard requests that a node has not answered since its last answer.
+    pub(crate) fn unanswered(&self, bus: u16, node: NodeId) -> u32 {
+        self.silent.get(&(bus, node)).copied().unwrap_or(0)
+    }
+
+    /// Something that the endpoint tells about its bus.
+    pub(crate) fn remark(&mut self, time: Option<Time>, what: &str) {
+        self.say(time.map(|time| time.0), None, "bus", what);
     }
 
     /// One line, unless it is the one before again.
@@ -340,6 +363,9 @@ impl Teller for Story<'_> {
             }
             Kind::BootUp { node, before } => {
                 self.drives.remove(&(number, node));
+                if let Some(count) = self.cycles.get_mut(&Cycle::Heartbeat(number, node)) {
+                    count.rhythm.pause();
+                }
                 let again = if before.is_some_and(|before| before != State::BootUp) { " again" } else { "" };
                 self.say(time, bus, &who(node), &format!("boots up{again}"));
             }

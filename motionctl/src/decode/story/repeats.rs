@@ -6,10 +6,11 @@ use canopen_master::NodeId;
 use canopen_master::trace::{PdoDirection, Tracer};
 
 use super::Story;
+use super::rhythm::Rhythm;
 
-/// Something that repeats itself.
+/// Something that repeats itself; the number of its bus first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Cycle {
+pub(crate) enum Cycle {
     Sync(u16),
     Time(u16),
     Pdo(u16, NodeId, PdoDirection, u16),
@@ -22,26 +23,59 @@ pub(super) enum Cycle {
 }
 
 #[derive(Debug, Default)]
-pub(super) struct Count {
-    number: u64,
-    first: Option<i64>,
-    last: Option<i64>,
+pub(crate) struct Count {
+    pub(crate) rhythm: Rhythm,
     /// Data of the frame before.
-    data: Vec<u8>,
-    pub(super) changes: u64,
+    pub(crate) data: Vec<u8>,
+    pub(crate) changes: u64,
+}
+
+impl Cycle {
+    /// The number of its bus.
+    pub(crate) const fn bus(self) -> u16 {
+        match self {
+            Self::Sync(bus)
+            | Self::Time(bus)
+            | Self::Pdo(bus, ..)
+            | Self::Channel(bus, _)
+            | Self::Heartbeat(bus, _)
+            | Self::Guarding(bus, _)
+            | Self::Stray(bus, _)
+            | Self::Identifier(bus, ..) => bus,
+        }
+    }
+
+    /// Whether its data are worth looking at.
+    pub(crate) const fn carries(self) -> bool {
+        matches!(self, Self::Pdo(..) | Self::Channel(..) | Self::Identifier(..))
+    }
+
+    /// What it is called.
+    pub(crate) fn name(self) -> String {
+        match self {
+            Self::Sync(_) => "SYNC".into(),
+            Self::Time(_) => "TIME".into(),
+            Self::Pdo(_, node, PdoDirection::Transmit, number) => format!("node {node} TPDO {number}"),
+            Self::Pdo(_, node, PdoDirection::Receive, number) => format!("node {node} RPDO {number}"),
+            Self::Channel(_, channel) => format!("CAN Link channel {channel}"),
+            Self::Heartbeat(_, node) => format!("node {node} heartbeat"),
+            Self::Guarding(_, node) => format!("node {node} guarding"),
+            Self::Stray(_, node) => format!("node {node} SDO frames that fit no transfer"),
+            Self::Identifier(_, id, extended) => {
+                let width = if extended { 8 } else { 3 };
+                format!("identifier {id:0width$X}h")
+            }
+        }
+    }
 }
 
 impl Story<'_> {
     /// Counts a frame of a cycle: whether it is the first, and whether its data are new.
     pub(super) fn cycle(&mut self, cycle: Cycle, time: Option<i64>, data: &[u8]) -> (bool, bool) {
         let count = self.cycles.entry(cycle).or_default();
-        let first = count.number == 0;
+        let first = count.rhythm.number == 0;
         let changed = first || count.data != data;
-        count.number += 1;
-        if first {
-            count.first = time;
-        }
-        count.last = time;
+        count.rhythm.beat(time);
         if changed {
             count.data.clear();
             count.data.extend_from_slice(data);
@@ -53,52 +87,30 @@ impl Story<'_> {
     /// The counts, when the capture has ended.
     pub(in super::super) fn end(&mut self, tracer: &Tracer) {
         self.repeated();
-        if self.cycles.values().any(|count| count.number > 1) {
+        if self.cycles.values().any(|count| count.rhythm.number > 1) {
             let _ = writeln!(self.out, "\nwhat repeated itself:");
         }
         let cycles = core::mem::take(&mut self.cycles);
-        for (cycle, count) in cycles.iter().filter(|(_, count)| count.number > 1) {
-            let (bus, what) = match *cycle {
-                Cycle::Sync(bus) => (bus, "SYNC".into()),
-                Cycle::Time(bus) => (bus, "TIME".into()),
-                Cycle::Pdo(bus, node, PdoDirection::Transmit, number) => {
-                    (bus, format!("node {node} TPDO {number}"))
-                }
-                Cycle::Pdo(bus, node, PdoDirection::Receive, number) => {
-                    (bus, format!("node {node} RPDO {number}"))
-                }
-                Cycle::Channel(bus, channel) => (bus, format!("CAN Link channel {channel}")),
-                Cycle::Heartbeat(bus, node) => {
-                    let state =
-                        tracer.state(bus, node).map(|state| format!(", at last {state}")).unwrap_or_default();
-                    (bus, format!("node {node} heartbeat{state}"))
-                }
-                Cycle::Guarding(bus, node) => (bus, format!("node {node} guarding")),
-                Cycle::Stray(bus, node) => (bus, format!("node {node} SDO frames that fit no transfer")),
-                Cycle::Identifier(bus, id, extended) => {
-                    let width = if extended { 8 } else { 3 };
-                    (bus, format!("identifier {id:0width$X}h"))
-                }
-            };
-            let bus = match self.buses.get(usize::from(bus)) {
+        for (cycle, count) in cycles.iter().filter(|(_, count)| count.rhythm.number > 1) {
+            let mut what = cycle.name();
+            if let Cycle::Heartbeat(bus, node) = *cycle
+                && let Some(state) = tracer.state(bus, node)
+            {
+                what = format!("{what}, at last {state}");
+            }
+            let bus = match self.buses.get(usize::from(cycle.bus())) {
                 Some(name) if self.buses.len() > 1 => format!("{name} "),
                 _ => String::new(),
             };
-            let period = match (count.first, count.last) {
-                (Some(first), Some(last)) if last > first => {
-                    let period = (last - first) as f64 / (count.number - 1) as f64 / 1e6;
-                    format!(", every {period:.1} ms")
-                }
-                _ => String::new(),
-            };
-            let carries = matches!(cycle, Cycle::Pdo(..) | Cycle::Channel(..) | Cycle::Identifier(..));
+            let period =
+                count.rhythm.mean().map_or_else(String::new, |mean| format!(", every {:.1} ms", mean / 1e6));
             let changes = match count.changes {
-                _ if !carries => String::new(),
+                _ if !cycle.carries() => String::new(),
                 0 => ", always the same".into(),
                 1 => ", 1 change".into(),
                 changes => format!(", {changes} changes"),
             };
-            let _ = writeln!(self.out, "  {bus}{what}: {} times{period}{changes}", count.number);
+            let _ = writeln!(self.out, "  {bus}{what}: {} times{period}{changes}", count.rhythm.number);
         }
         let again: u64 = self.objects.values().map(|told| told.again).sum();
         if again > 0 {

@@ -1,0 +1,123 @@
+//! How something repeats itself: how often, at what period, and whether some of it is missing.
+
+/// A gap this many times the period is more than jitter: in tenths.
+const GAP: i64 = 15;
+/// A period follows its intervals by one part in so many.
+const SMOOTH: i64 = 8;
+
+/// What is counted of something that comes again and again. Times in nanoseconds.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct Rhythm {
+    pub(crate) number: u64,
+    pub(crate) first: Option<i64>,
+    pub(crate) last: Option<i64>,
+    /// As it is now.
+    pub(crate) period: Option<i64>,
+    pub(crate) shortest: Option<i64>,
+    pub(crate) longest: Option<i64>,
+    /// How many did not come, judged by the period before them.
+    pub(crate) missed: u64,
+    /// A gap that may be a new period, and how many are missing if it is none.
+    doubt: Option<(i64, u64)>,
+    /// It began anew after the last one.
+    paused: bool,
+}
+
+impl Rhythm {
+    /// It came once more.
+    pub(crate) fn beat(&mut self, time: Option<i64>) {
+        self.number += 1;
+        let before = core::mem::replace(&mut self.last, time).filter(|_| !self.paused);
+        self.paused = false;
+        if self.number == 1 {
+            self.first = time;
+        }
+        let Some((time, before)) = time.zip(before) else { return };
+        let gap = time.saturating_sub(before);
+        if gap < 0 {
+            return;
+        }
+        self.shortest = Some(self.shortest.map_or(gap, |shortest| shortest.min(gap)));
+        self.longest = Some(self.longest.map_or(gap, |longest| longest.max(gap)));
+        let Some(period) = self.period else {
+            self.period = Some(gap);
+            return;
+        };
+        match self.doubt.take() {
+            // The same gap again: that is how it goes now.
+            Some((new, _)) if (gap - new).abs() <= new / 4 => {
+                self.period = Some(gap);
+                return;
+            }
+            Some((_, missing)) => self.missed += missing,
+            None => {}
+        }
+        if period > 0 && gap.saturating_mul(10) > period.saturating_mul(GAP) {
+            let missing = gap.saturating_add(period / 2) / period - 1;
+            self.doubt = Some((gap, u64::try_from(missing).unwrap_or(0)));
+        } else {
+            self.period = Some(period + (gap - period) / SMOOTH);
+        }
+    }
+
+    /// It begins anew: what is between is no gap.
+    pub(crate) const fn pause(&mut self) {
+        self.paused = true;
+        self.period = None;
+        self.doubt = None;
+    }
+
+    /// Over all of it, in nanoseconds.
+    pub(crate) fn mean(&self) -> Option<f64> {
+        let (first, last) = self.first.zip(self.last).filter(|(first, last)| last > first)?;
+        Some((last - first) as f64 / (self.number - 1) as f64)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn heard(times: impl IntoIterator<Item = i64>) -> Rhythm {
+        let mut rhythm = Rhythm::default();
+        times.into_iter().for_each(|time| rhythm.beat(Some(time)));
+        rhythm
+    }
+
+    #[test]
+    fn beats_that_are_missing_are_counted() {
+        let rhythm = heard([0, 100, 201, 300, 700, 800, 900]);
+        assert_eq!((rhythm.number, rhythm.missed), (7, 3));
+        assert_eq!((rhythm.shortest, rhythm.longest), (Some(99), Some(400)));
+        assert!((95..=105).contains(&rhythm.period.unwrap()), "{rhythm:?}");
+        // Two gaps of different length, one behind the other.
+        assert_eq!(heard([0, 100, 200, 400, 700, 800]).missed, 1 + 2);
+    }
+
+    #[test]
+    fn a_new_period_is_no_loss() {
+        let slower = heard([0, 100, 200, 1200, 2200, 3200]);
+        assert_eq!((slower.missed, slower.period), (0, Some(1000)));
+        let faster = heard((0..4).map(|n| n * 1000).chain((0..50).map(|n| 3100 + n * 100)));
+        assert_eq!(faster.missed, 0);
+        assert!(faster.period.unwrap() < 110, "{faster:?}");
+    }
+
+    #[test]
+    fn without_times_it_is_only_counted() {
+        let mut rhythm = Rhythm::default();
+        rhythm.beat(None);
+        rhythm.beat(Some(5));
+        rhythm.beat(None);
+        rhythm.beat(Some(i64::MIN));
+        rhythm.beat(Some(i64::MAX));
+        rhythm.beat(Some(i64::MIN));
+        assert_eq!((rhythm.number, rhythm.missed), (6, 0));
+        assert_eq!(heard([3, 3, 3, 3]).period, Some(0));
+        assert_eq!(heard([0, 10]).mean(), Some(10.0));
+        let mut again = heard([0, 100, 200]);
+        again.pause();
+        again.beat(Some(5000));
+        assert_eq!((again.missed, again.period), (0, None));
+    }
+}
