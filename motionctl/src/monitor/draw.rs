@@ -290,7 +290,7 @@ mod tests {
         assert_eq!(screen(&mut eye, 60, 24)[22], "0");
         press(&mut eye, KeyCode::Char('p'));
         let lines = screen(&mut eye, 60, 24);
-        assert!(lines[0].ends_with("PAUSED") && lines[23].contains("Home End"), "{lines:#?}");
+        assert!(lines[0].ends_with("PAUSED") && lines[23].contains(", . < >"), "{lines:#?}");
         for (code, wish) in [
             (KeyCode::Char('q'), Wish::Quit),
             (KeyCode::Esc, Wish::Quit),
