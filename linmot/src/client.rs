@@ -52,7 +52,12 @@ pub enum Outcome {
     /// The drive answered with another status.
     Refused(Reply),
     /// The count was not echoed in time. The command may have been carried out all the same.
-    NoEcho,
+    NoEcho {
+        /// Sent with the command.
+        expected: u8,
+        /// What the drive showed all the time; `None` if nothing came.
+        shown: Option<u8>,
+    },
     /// The echo came, but the drive stayed at this status for too long.
     StillRunning(Status),
     /// The count fell back to 0: the drive has restarted. The command may have been carried out.
@@ -84,10 +89,12 @@ const SYNC: u8 = 15;
 enum State {
     Idle,
     ToSend,
-    /// The echo is outstanding until `deadline`; the image goes out again at `repeat`.
+    /// The echo is outstanding until `deadline`; the image goes out again at `repeat`. `shown`: an
+    /// earlier count, which has come meanwhile.
     Echo {
         deadline: Duration,
         repeat: Duration,
+        shown: Option<u8>,
     },
     /// Echoed, with a status that another one follows.
     Running {
@@ -100,7 +107,8 @@ enum State {
 /// The client of one drive's configuration module.
 ///
 /// - Commands: [`submit`](Self::submit), [`cancel`](Self::cancel).
-/// - Input: [`handle_input`](Self::handle_input), [`handle_timeout`](Self::handle_timeout).
+/// - Input: [`handle_input`](Self::handle_input), [`handle_restart`](Self::handle_restart),
+///   [`handle_timeout`](Self::handle_timeout).
 /// - Output: [`poll_transmit`](Self::poll_transmit), or [`image`](Self::image) for a carrier that
 ///   sends the process data in every cycle; [`poll_event`](Self::poll_event),
 ///   [`poll_timeout`](Self::poll_timeout).
@@ -178,7 +186,8 @@ impl Client {
         let repeat = now.saturating_add(self.config.repeat);
         match &mut self.state {
             State::ToSend => {
-                self.state = State::Echo { deadline: now.saturating_add(self.config.echo), repeat };
+                let deadline = now.saturating_add(self.config.echo);
+                self.state = State::Echo { deadline, repeat, shown: None };
             }
             State::Echo { repeat: at, .. } if now >= *at => *at = repeat,
             _ => return None,
@@ -193,24 +202,42 @@ impl Client {
         let expected = self.output.count;
         let waiting = matches!(self.state, State::Echo { .. } | State::Running { .. });
         if !waiting {
+            // The drive has restarted: the last command would be a new one to it.
+            if input.count == 0 && before != Some(0) && self.state != State::ToSend {
+                self.output = Output::IDLE;
+            }
             return;
         }
         if input.count == expected {
             self.echoed(now, input.reply);
         } else if before.is_none_or(|count| count == input.count) && !self.is_running() {
             // The last command's echo, still.
+            if let State::Echo { shown, .. } = &mut self.state {
+                *shown = Some(input.count);
+            }
         } else if input.count == 0 {
-            self.state = State::Ended(Outcome::Restarted);
+            self.handle_restart();
         } else {
             self.state = State::Ended(Outcome::WrongEcho { expected, found: input.count });
+        }
+    }
+
+    /// The drive has restarted, as its carrier tells (the boot-up message of a CANopen node): its count
+    /// is 0, and a command under way ends with [`Outcome::Restarted`]. The image becomes empty, since to a
+    /// drive that has started anew the last command is a new one.
+    pub fn handle_restart(&mut self) {
+        (self.shown, self.output, self.pending) = (Some(0), Output::IDLE, None);
+        if !matches!(self.state, State::Idle | State::Ended(_)) {
+            self.state = State::Ended(Outcome::Restarted);
         }
     }
 
     /// Ends commands whose time is over; early calls do nothing.
     pub fn handle_timeout(&mut self, now: Duration) {
         match self.state {
-            State::Echo { deadline, .. } if now >= deadline => {
-                self.state = State::Ended(Outcome::NoEcho);
+            State::Echo { deadline, shown, .. } if now >= deadline => {
+                let expected = self.output.count;
+                self.state = State::Ended(Outcome::NoEcho { expected, shown });
             }
             State::Running { deadline, status } if now >= deadline => {
                 self.state = State::Ended(Outcome::StillRunning(status));
@@ -224,7 +251,7 @@ impl Client {
     #[must_use]
     pub fn poll_timeout(&self) -> Option<Duration> {
         match self.state {
-            State::Echo { deadline, repeat } => Some(deadline.min(repeat)),
+            State::Echo { deadline, repeat, .. } => Some(deadline.min(repeat)),
             State::Running { deadline, .. } => Some(deadline),
             _ => None,
         }
@@ -368,8 +395,10 @@ mod tests {
             client.poll_event().map(|event| event.outcome)
         };
         assert_eq!(end(&[], 999), None);
-        assert_eq!(end(&[], 1000), Some(Outcome::NoEcho));
-        assert_eq!(end(&[shows(Status::OK, 1, 0); 3], 1000), Some(Outcome::NoEcho));
+        // Lost: nothing comes at all, or the last command's count over and over.
+        let lost = |shown| Some(Outcome::NoEcho { expected: 2, shown });
+        assert_eq!(end(&[], 1000), lost(None));
+        assert_eq!(end(&[shows(Status::OK, 1, 0); 3], 1000), lost(Some(1)));
         assert_eq!(end(&[shows(Status::OK, 0, 0)], 2), Some(Outcome::Restarted));
         let wrong = Outcome::WrongEcho { expected: 2, found: 4 };
         assert_eq!(end(&[shows(Status::OK, 4, 0)], 2), Some(wrong));
@@ -380,6 +409,31 @@ mod tests {
         client.cancel(ticket);
         assert_eq!(client.poll_event(), Some(Event { ticket, outcome: Outcome::Cancelled }));
         assert_eq!(client.poll_transmit(ms(0)), None);
+    }
+
+    /// To a drive that has started anew a control word of before is a new command.
+    #[test]
+    fn nothing_is_repeated_after_a_restart() {
+        let mut client = synchronised();
+        client.submit(&READ).unwrap();
+        sent(&mut client, 0);
+        client.handle_restart();
+        assert_eq!(client.poll_event().unwrap().outcome, Outcome::Restarted);
+        assert_eq!((client.image(), client.poll_transmit(ms(1))), ([0; 8], None));
+        // The idle image of the start comes after the message that told of it.
+        client.submit(&READ).unwrap();
+        assert_eq!(sent(&mut client, 2), (Command::READ_ROM, 1));
+        client.handle_input(ms(3), shows(Status::OK, 0, 0));
+        assert_eq!(client.poll_event(), None);
+        client.handle_input(ms(4), shows(Status::OK, 1, 9));
+        assert!(matches!(client.poll_event().unwrap().outcome, Outcome::Done(_)));
+        // Seen by the count alone, between two commands.
+        client.handle_input(ms(5), shows(Status::OK, 0, 0));
+        assert_eq!((client.image(), client.poll_event()), ([0; 8], None));
+        client.submit(&READ).unwrap();
+        assert_eq!(sent(&mut client, 6), (Command::READ_ROM, 1));
+        client.handle_input(ms(7), shows(Status::OK, 1, 9));
+        assert!(matches!(client.poll_event().unwrap().outcome, Outcome::Done(_)));
     }
 
     /// Manual B 7.1.2: 30h with count 0; the counts in use never reach 0 otherwise.

@@ -473,8 +473,10 @@ pub struct Module {
     service: Service,
     input: Input,
     changed: bool,
-    /// The command in the image goes on.
+    /// The command in the image goes on, or waits.
     running: bool,
+    /// Waits for the end of what the drive is busy with.
+    waiting: Option<Request>,
     away: bool,
 }
 
@@ -488,7 +490,14 @@ impl Module {
     /// As after a restart: count 0.
     #[must_use]
     pub const fn new() -> Self {
-        Self { service: Service::new(), input: Input::IDLE, changed: false, running: false, away: false }
+        Self {
+            service: Service::new(),
+            input: Input::IDLE,
+            changed: false,
+            running: false,
+            waiting: None,
+            away: false,
+        }
     }
 
     /// The process data from the drive as they are now.
@@ -510,26 +519,44 @@ impl Module {
             self.changed = true;
             return;
         }
-        let reply = match Request::parse(output.command, output.words) {
-            Some(request) => self.service.execute(now, &request, drive),
+        self.input.count = output.count;
+        match Request::parse(output.command, output.words) {
+            Some(request) => self.execute(now, &request, drive),
             // Manual B has no status for it; project-defined.
-            None => Reply::new(Status::RANGE, output.words),
-        };
-        self.running = reply.status == Status::RUNNING;
-        self.input = Input { reply, count: output.count };
-        self.changed = true;
+            None => self.show(Reply::new(Status::RANGE, output.words)),
+        }
         self.away = drive.is_restarting(now);
     }
 
-    /// Shows the end of a command that was running, and the idle image after a restart.
-    pub fn handle_timeout(&mut self, now: Duration, drive: &impl Drive) {
-        if self.away && !drive.is_restarting(now) {
+    fn show(&mut self, reply: Reply) {
+        self.running = reply.status.is_running();
+        self.input.reply = reply;
+        self.changed = true;
+    }
+
+    /// A command that finds the drive busy shows that until its turn comes (project-defined).
+    fn execute(&mut self, now: Duration, request: &Request, drive: &mut impl Drive) {
+        let reply = self.service.execute(now, request, drive);
+        self.waiting = (reply.status == Status::BUSY).then_some(*request);
+        self.show(reply);
+    }
+
+    /// Shows the end of a command that was running, carries out one that had to wait, and shows the idle
+    /// image after a restart.
+    pub fn handle_timeout(&mut self, now: Duration, drive: &mut impl Drive) {
+        if drive.is_restarting(now) {
+            self.away = true;
+            return;
+        }
+        if self.away {
             *self = Self { changed: true, ..Self::new() };
         }
         if self.running && !drive.is_busy(now) {
-            self.running = false;
-            self.input.reply.status = Status::OK;
-            self.changed = true;
+            match self.waiting.take() {
+                Some(request) => self.execute(now, &request, drive),
+                None => self.show(Reply { status: Status::OK, ..self.input.reply }),
+            }
+            self.away = drive.is_restarting(now);
         }
     }
 

@@ -191,7 +191,7 @@ impl Objects for DriveObjects {
     }
 
     fn handle_timeout(&mut self, now: Duration) {
-        self.module.handle_timeout(now, &self.drive);
+        self.module.handle_timeout(now, &mut self.drive);
     }
 
     fn poll_transmit(&mut self, _now: Duration) -> Option<Frame> {

@@ -19,6 +19,9 @@ const START: u8 = 0x01;
 /// Longest time for an SDO answer.
 const ANSWER: Duration = Duration::from_millis(500);
 
+/// The same after a boot-up message: the node has forgotten the request, or received it just now.
+const BOOTED: Duration = Duration::from_millis(100);
+
 /// Frames that are looked through before a request, on a bus where they never end.
 const STALE: u32 = 1000;
 
@@ -87,11 +90,14 @@ impl SdoLink {
         // An answer that the bus has delivered twice must not be taken for the next one.
         self.booted |= drain(self.port.as_mut(), self.node)?;
         send(self.port.as_mut(), &Frame::standard(cob::SDO_REQUEST + node, access.encode()), self.answer)?;
-        let end = self.port.now().saturating_add(self.answer);
+        let mut end = self.port.now().saturating_add(self.answer);
         loop {
             let left = end.saturating_sub(self.port.now());
             if let Some(Event::Frame(frame)) = self.port.receive(left)? {
-                self.booted |= is_boot_up(&frame, self.node);
+                if is_boot_up(&frame, self.node) {
+                    self.booted = true;
+                    end = end.min(self.port.now().saturating_add(BOOTED));
+                }
                 if frame.standard_id() == Some(cob::SDO_RESPONSE + node)
                     && let Ok(telegram) = <[u8; 8]>::try_from(frame.data())
                     && let Some((index, sub, answer)) = Answer::parse(telegram)
@@ -116,6 +122,10 @@ impl SdoLink {
             }
             _ => None,
         })
+    }
+
+    fn is_busy(&mut self) -> io::Result<bool> {
+        Ok(self.exchange(&Access::flash_state())?.is_some_and(sdo::Client::is_flash_busy))
     }
 
     /// Flash is written and the software started while the drive answers "busy" here.
@@ -145,11 +155,19 @@ impl Link for SdoLink {
         let command = request.command();
         let access = Access::new(request).ok_or(LinkError::NotCarried(command))?;
         self.booted = false;
-        let attempts = if request.is_repeatable() { 1 + u32::from(self.retries) } else { 1 };
-        for _ in 0..attempts {
+        let mut attempts = if request.is_repeatable() { 1 + u32::from(self.retries) } else { 1 };
+        let mut waited = false;
+        while attempts > 0 {
+            attempts -= 1;
             let Some(answer) = self.exchange(&access)? else { continue };
             let mut reply = match self.client.reply(request, answer) {
                 Ok(reply) => reply,
+                // Refused by a drive that is busy: nothing was carried out.
+                Err(aborted) if aborted.0 == sdo::abort::STATE && !waited && self.is_busy()? => {
+                    self.wait(command)?;
+                    (waited, attempts) = (true, attempts + 1);
+                    continue;
+                }
                 Err(aborted) => {
                     let result = self.result(request)?;
                     return result.ok_or(LinkError::Aborted { command, aborted });
@@ -189,8 +207,14 @@ impl PdoLink {
         Self { port, node, client, operational: false }
     }
 
-    /// Returns whether the node has started anew.
-    fn turn(&mut self) -> io::Result<bool> {
+    /// The node has started anew.
+    fn booted(&mut self) {
+        self.operational = false;
+        // It would carry a repeated image out once more.
+        self.client.handle_restart();
+    }
+
+    fn turn(&mut self) -> io::Result<()> {
         let node = u16::from(self.node.raw());
         if !core::mem::replace(&mut self.operational, true) {
             send(self.port.as_mut(), &Frame::standard(cob::NMT, [START, self.node.raw()]), ANSWER)?;
@@ -202,18 +226,17 @@ impl PdoLink {
         let timeout = self.client.poll_timeout().map_or(Duration::ZERO, |at| at.saturating_sub(now));
         let event = self.port.receive(timeout)?;
         let now = self.port.now();
-        let mut booted = false;
         if let Some(Event::Frame(frame)) = event {
-            booted = is_boot_up(&frame, self.node);
-            if frame.standard_id() == Some(TPDO + node)
+            if is_boot_up(&frame, self.node) {
+                self.booted();
+            } else if frame.standard_id() == Some(TPDO + node)
                 && let Ok(image) = <[u8; 8]>::try_from(frame.data())
             {
                 self.client.handle_input(now, image);
             }
         }
         self.client.handle_timeout(now);
-        self.operational &= !booted;
-        Ok(booted)
+        Ok(())
     }
 }
 
@@ -222,39 +245,35 @@ impl Link for PdoLink {
 
     fn call(&mut self, request: &Request) -> Result<Reply, LinkError> {
         let command = request.command();
-        let end = self.port.now().saturating_add(BUSY);
-        self.operational &= !drain(self.port.as_mut(), self.node)?;
-        loop {
-            let ticket =
-                self.client.submit(request).map_err(|_| io::Error::from(io::ErrorKind::Interrupted))?;
-            let outcome = loop {
-                if let Some(event) = self.client.poll_event() {
-                    break event.outcome;
-                }
-                let error = match self.turn() {
-                    Ok(false) => continue,
-                    // A drive that has started anew would carry the repeated image out once more.
-                    Ok(true) => LinkError::Restarted { command },
-                    Err(error) => error.into(),
-                };
+        if drain(self.port.as_mut(), self.node)? {
+            self.booted();
+        }
+        let ticket = self.client.submit(request).map_err(|_| io::Error::from(io::ErrorKind::Interrupted))?;
+        let outcome = loop {
+            if let Some(event) = self.client.poll_event() {
+                break event.outcome;
+            }
+            if let Err(error) = self.turn() {
                 self.client.cancel(ticket);
                 self.client.poll_event();
-                return Err(error);
-            };
-            return Err(match outcome {
-                Outcome::Done(reply) | Outcome::Refused(reply) => return Ok(reply),
-                Outcome::StillRunning(_) if self.port.now() < end => continue,
-                Outcome::StillRunning(_) => LinkError::StillBusy { command },
-                Outcome::Restarted => LinkError::Restarted { command },
-                Outcome::WrongEcho { expected, found } => {
-                    let found = format!("count {found}, {expected} expected");
-                    LinkError::WrongEcho { command, found }
-                }
-                _ => {
-                    self.operational = false;
-                    LinkError::NoAnswer { command }
-                }
-            });
-        }
+                return Err(error.into());
+            }
+        };
+        Err(match outcome {
+            Outcome::Done(reply) | Outcome::Refused(reply) => return Ok(reply),
+            Outcome::StillRunning(_) => LinkError::StillBusy { command },
+            Outcome::Restarted => LinkError::Restarted { command },
+            Outcome::WrongEcho { expected, found } => {
+                let found = format!("count {found}, {expected} expected");
+                LinkError::WrongEcho { command, found }
+            }
+            Outcome::NoEcho { expected, shown: Some(shown) } => {
+                LinkError::NoEcho { command, expected, shown }
+            }
+            _ => {
+                self.operational = false;
+                LinkError::NoAnswer { command }
+            }
+        })
     }
 }

@@ -30,6 +30,19 @@ pub enum LinkError {
         /// What was asked.
         command: Command,
     },
+    /// Answers come, but they show the count of an earlier command.
+    #[error(
+        "the drive does not echo count {expected} of {command}, it shows count {shown} still{}",
+        unknown(*.command)
+    )]
+    NoEcho {
+        /// What was asked.
+        command: Command,
+        /// Sent with it.
+        expected: u8,
+        /// What the drive shows.
+        shown: u8,
+    },
     /// The drive restarted while the command was under way.
     #[error("the drive restarted during {command}{}", unknown(*.command))]
     Restarted {
@@ -37,7 +50,7 @@ pub enum LinkError {
         command: Command,
     },
     /// Something answered that does not belong to the command.
-    #[error("wrong answer to {command}: {found}")]
+    #[error("wrong answer to {command}: {found}{}", unknown(*.command))]
     WrongEcho {
         /// What was asked.
         command: Command,

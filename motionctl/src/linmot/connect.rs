@@ -103,7 +103,7 @@ fn endpoint(global: &Global, drive: &Drive) -> Result<(ChoiceOf, String), Exit> 
 impl From<LinkError> for Exit {
     fn from(error: LinkError) -> Self {
         let status = match error {
-            LinkError::NoAnswer { .. } | LinkError::StillBusy { .. } => 3,
+            LinkError::NoAnswer { .. } | LinkError::NoEcho { .. } | LinkError::StillBusy { .. } => 3,
             LinkError::WrongEcho { .. } | LinkError::Restarted { .. } | LinkError::Aborted { .. } => 4,
             LinkError::NotCarried(_) => 2,
             _ => 5,
@@ -152,7 +152,9 @@ fn hint(request: &Request, status: Status) -> &'static str {
         (Status::DEFINED, Request::StartCurve { .. }) => ": no such curve",
         (Status::DEFINED, _) => ": no such entry",
         (Status::ODD_ADDRESS, _) => ": the block was finished already",
-        (Status::NOT_STOPPED, _) => ": stop it first",
+        (Status::NOT_STOPPED, _) => {
+            ": it was stopped for this, and something has started it again; nothing was saved"
+        }
         _ => "",
     }
 }

@@ -165,7 +165,7 @@ fn write(
     let bar = out.progress("writing", setpoints.len());
     for (number, setpoint) in (1..).zip(&setpoints) {
         link.write_setpoint(access, &info, number, *setpoint)
-            .map_err(|fault| Exit::from(fault).context(left(access)))?;
+            .map_err(|fault| Exit::from(fault).context(&left(&mut link, access, id)))?;
         bar.inc(1);
     }
     bar.finish_and_clear();
@@ -173,11 +173,13 @@ fn write(
     Ok(())
 }
 
-/// What a curve is that was begun and not completed.
-const fn left(access: Access) -> &'static str {
-    match access {
-        Access::Modify => "the curve's info block may be written, its setpoints are the old ones",
-        _ => "the curve was not added",
+/// What a curve is that was begun and whose end was not confirmed, as far as the drive tells.
+fn left(link: &mut AnyLink, access: Access, id: u16) -> String {
+    match (access, link.curve_info(id)) {
+        (Access::Add, Ok(None)) => format!("curve {id} was not added"),
+        (Access::Add, Ok(Some(_))) => format!("curve {id} is in RAM, perhaps not as in the file"),
+        (Access::Add, Err(_)) => format!("curve {id} may be in RAM, perhaps not as in the file"),
+        _ => format!("curve {id} in RAM may be the old one, as in the file, or as in the file in part"),
     }
 }
 
@@ -188,7 +190,8 @@ fn not_started(link: &mut AnyLink, access: Access, info: &InfoBlock, fault: Faul
         Fault::Refused { request: Request::StartCurve { .. }, reply } => (true, reply.status == Status::SIZE),
         _ => (false, false),
     };
-    let mut exit = Exit::from(fault).context(if start { "nothing was written" } else { left(access) });
+    let state = if start { "nothing was written".to_owned() } else { left(link, access, info.id) };
+    let mut exit = Exit::from(fault).context(&state);
     if size
         && access == Access::Modify
         && let Ok(Some(found)) = link.curve_info(info.id)

@@ -122,28 +122,22 @@ fn restore(
     });
     bar.finish_and_clear();
     let done = done.map_err(|error| {
-        let before = matches!(
-            error,
-            TransferError::Check { .. }
-                | TransferError::Incompatible(_)
-                | TransferError::Parameters(_)
-                | TransferError::CurveSize(_)
-        );
         let refused = matches!(&error, TransferError::Drive(fault) if !matches!(fault, Fault::Carrier(_)));
         let exit = failed(path, error);
-        if before {
+        let Progress { begun, parameters, written, curves, .. } = last;
+        if !begun {
             return exit.context("nothing was written");
         }
-        let Progress { parameters, written, curves, .. } = last;
+        let deleted = if delete_curves { "the drive's own curves may be deleted, " } else { "" };
         let remedy = if refused { "correct what it refuses and restore again" } else { "the same restore completes it" };
         exit.context(&format!(
-            "incomplete: {} ({written} of them written) and {} are as in the file, curves in RAM only, the MC \
-             software may be stopped; {remedy}",
+            "incomplete: {deleted}{} ({written} of them written) and {} are as in the file, curves in RAM only, the \
+             MC software may be stopped; {remedy}",
             parameters_of(parameters),
             curves_of(curves)
         ))
     })?;
-    let Progress { parameters, written, curves, setpoints } = done;
+    let Progress { parameters, written, curves, setpoints, .. } = done;
     let json = json!({
         "dry_run": global.dry_run, "parameters": parameters, "written": written,
         "curves": curves, "setpoints": setpoints, "saved": !global.dry_run,

@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use linmot::link::LinkExt;
+use linmot::code::Status;
+use linmot::link::{Fault, LinkExt};
 use linmot::request::Request;
 use linmot::table::{ENTRIES, Entry, EntryError, LinkFault, Presence, check_links};
 use serde_json::{Value, json};
@@ -141,9 +142,16 @@ fn set(out: &Output, global: &Global, drive: &Drive, number: u16, raw: &str) -> 
     Ok(())
 }
 
-/// An entry is as it was until its last word has come.
 fn write(link: &mut AnyLink, number: u16, entry: &Entry) -> Result<(), Exit> {
-    link.write_entry(number, entry)?;
+    if let Err(fault) = link.write_entry(number, entry) {
+        let now = match link.read_entry(number) {
+            Ok(found) if found == *entry => "is there as it was to be",
+            Ok(_) => "is another one than was to be written",
+            Err(Fault::Refused { reply, .. }) if reply.status == Status::DEFINED => "does not exist",
+            Err(_) => "may be written, perhaps in part",
+        };
+        return Err(Exit::from(fault).context(&format!("entry {number} in RAM {now}")));
+    }
     if link.read_entry(number)? != *entry {
         return Err(Exit::check(format!("entry {number}: other bytes were read back than written")));
     }
@@ -257,11 +265,12 @@ fn restore(out: &Output, global: &Global, drive: &Drive, path: &Path) -> Result<
     }
     out.confirm(global.yes, "Stop the MC software and write the command table to RAM and flash?")?;
     let mut link = connect(global, drive)?;
-    let mut written = 0;
+    let (mut deleted, mut written) = (0, 0);
     let restored = stopped(&mut link, |link| {
         let present = link.presence()?;
         for entry in present.iter().filter(|entry| !entries.contains_key(entry)) {
             link.ask(Request::DeleteEntry { entry })?;
+            deleted += 1;
         }
         let bar = out.progress("writing", entries.len());
         for (number, entry) in &entries {
@@ -275,7 +284,9 @@ fn restore(out: &Output, global: &Global, drive: &Drive, path: &Path) -> Result<
     });
     restored.map_err(|exit| {
         let all = entries_of(&entries);
-        exit.context(&format!("{written} of {all} written in RAM, the same restore completes it"))
+        exit.context(&format!(
+            "{written} of {all} written and {deleted} others deleted in RAM, the same restore completes it"
+        ))
     })?;
     out.document(json!({ "entries": entries.len(), "saved": true }), || {
         println!("{} written to RAM and flash", entries_of(&entries));

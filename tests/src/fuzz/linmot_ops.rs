@@ -33,7 +33,8 @@ fn module_client(input: &mut Input<'_>) {
     let mut client = Client::default();
     let (mut now, mut open) = (Duration::ZERO, None);
     while !input.is_empty() {
-        match input.u8() % 6 {
+        match input.u8() % 7 {
+            6 => client.handle_restart(),
             0 => {
                 if let Ok(ticket) = client.submit(&request(input)) {
                     assert!(open.replace(ticket).is_none(), "one command at a time");
@@ -168,7 +169,7 @@ pub fn linmot_drive_ops(data: &[u8]) {
                 module.handle_output(now, image, &mut drive);
                 if !drive.is_restarting(now) {
                     let shown = ModuleInput::parse(module.image());
-                    assert!(shown.count == count || shown.reply.status == Status::RUNNING);
+                    assert!(shown.count == count || shown.reply.status.is_running());
                 }
             }
             (_, 1) => {
@@ -185,7 +186,7 @@ pub fn linmot_drive_ops(data: &[u8]) {
             }
         }
         drive.advance(now);
-        module.handle_timeout(now, &drive);
+        module.handle_timeout(now, &mut drive);
         slave.handle_timeout(now, &mut drive);
         while slave.poll_transmit(now).is_some() {}
     }

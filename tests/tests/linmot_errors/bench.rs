@@ -71,6 +71,19 @@ impl World {
         self.collect();
     }
 
+    /// Time passes until something has come, at most this long.
+    fn pass(&mut self, time: Duration) {
+        let end = self.now + time;
+        while self.now < end && self.frames.is_empty() && self.bytes.is_empty() {
+            let next = match &self.station {
+                Station::Can(node) => node.poll_timeout(),
+                Station::LinRs { slave, drive } => slave.poll_timeout(drive),
+            };
+            let next = next.unwrap_or(end).clamp(self.now + Duration::from_micros(1), end);
+            self.wait(next - self.now);
+        }
+    }
+
     fn collect(&mut self) {
         let answer = |id: u16| id & 0x780 == cob::SDO_RESPONSE || id & 0x780 == TPDO;
         match &mut self.station {
@@ -129,9 +142,7 @@ impl CanPort for Wire {
 
     fn receive(&mut self, timeout: Duration) -> io::Result<Option<Event>> {
         let mut world = self.0.lock().unwrap();
-        if world.frames.is_empty() && !timeout.is_zero() {
-            world.wait(timeout);
-        }
+        world.pass(timeout);
         Ok(world.frames.pop_front().map(Event::Frame))
     }
 
@@ -143,9 +154,7 @@ impl CanPort for Wire {
 impl Port for Wire {
     fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<usize> {
         let mut world = self.0.lock().unwrap();
-        if world.bytes.is_empty() {
-            world.wait(timeout);
-        }
+        world.pass(timeout);
         let len = world.bytes.len().min(buffer.len());
         buffer.iter_mut().zip(world.bytes.drain(..len)).for_each(|(room, byte)| *room = byte);
         Ok(len)

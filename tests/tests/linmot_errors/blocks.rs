@@ -1,9 +1,14 @@
 //! Curves and command table: blocks of another size, finished, begun and not ended; flash while the software runs.
 
+use core::time::Duration;
+
+use device_sim::linmot::Times;
 use linmot::code::Status;
+use linmot::drive::Drive;
 use linmot::link::LinkExt;
-use linmot::request::{Access, Request};
+use linmot::request::{Access, Memory, Request, Value};
 use linmot::table::Entry;
+use linmot::upid::Upid;
 
 use crate::bench::*;
 
@@ -92,5 +97,42 @@ fn nothing_is_left_half_written() {
         let last = Request::CurveInfo { access: Access::Modify, curve: 5, value: words[17] };
         bench.refuses(last, Status::SIZE, "curve 5");
         assert_eq!(bench.world().drive().curve_in_ram(5).unwrap().info, other.encode(), "{carrier:?}");
+    }
+}
+
+/// Flash is being written for somebody else: the command is carried out when that is over, and once.
+#[test]
+fn a_busy_drive_is_asked_again() {
+    for carrier in CARRIERS {
+        let mut bench = Bench::new(carrier);
+        bench.link.read(Upid(0x13A2), Value::Ram).unwrap();
+        for flash in [Duration::from_millis(400), Duration::from_secs(60)] {
+            let began = {
+                let mut world = bench.world();
+                let (now, times) = (world.now, Times { flash, ..TIMES });
+                world.drive().set_times(times);
+                world.drive().save_curves(now);
+                now
+            };
+            let read = bench.link.read(Upid(0x13A2), Value::Ram);
+            let waited = bench.world().now - began;
+            if flash < Duration::from_secs(15) {
+                assert_eq!(read.unwrap(), 10, "{carrier:?}");
+                assert!(waited < flash + Duration::from_millis(100), "{carrier:?}: {waited:?}");
+                let writes = bench.world().drive().writes();
+                bench
+                    .link
+                    .ask(Request::Write { memory: Memory::Rom, upid: Upid(0x13A2), value: 10 })
+                    .unwrap();
+                assert_eq!(bench.world().drive().writes(), writes + 1, "{carrier:?}");
+            } else {
+                let error = read.unwrap_err().to_string();
+                assert!(
+                    error.contains("the drive is still busy with read RAM value"),
+                    "{carrier:?}: {error}"
+                );
+                assert!(waited < Duration::from_secs(31), "{carrier:?}: {waited:?}");
+            }
+        }
     }
 }

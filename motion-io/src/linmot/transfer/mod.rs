@@ -189,6 +189,8 @@ impl Summary {
 /// What was transferred so far.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Progress {
+    /// A restore has begun to change the drive.
+    pub begun: bool,
     /// Parameters of the drive that are as in the file.
     pub parameters: usize,
     /// Those among them that had to be written.

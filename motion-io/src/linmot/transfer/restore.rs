@@ -44,13 +44,14 @@ pub fn restore<L: Link>(
         }
     }
     file.rewind()?;
+    let mut done = Progress { begun: !options.dry_run, ..Progress::default() };
+    progress(done);
     if !options.dry_run {
         link.ask(Request::Stop)?;
         if options.delete_curves {
             link.ask(Request::DeleteCurves)?;
         }
     }
-    let mut done = Progress::default();
     let mut curve: Option<(Access, InfoBlock, usize)> = None;
     read(file, |event| -> Result<(), TransferError<L::Error>> {
         match event {
@@ -91,7 +92,7 @@ pub fn restore<L: Link>(
         Ok(())
     })?;
     if !options.dry_run {
-        if !summary.curves.is_empty() {
+        if options.delete_curves || !summary.curves.is_empty() {
             link.ask(Request::SaveCurves)?;
         }
         link.ask(Request::Start)?;
