@@ -1,5 +1,6 @@
 /* An axis with an analog drive and an incremental encoder, both simulated here: enable, home position,
- * move there and back, a following error when the drive sticks. Ends with 0 if all was as expected. */
+ * move there and back, a following error when the drive sticks; and a virtual axis 2 that is geared to the
+ * encoder by -3/7. Ends with 0 if all was as expected. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -9,11 +10,11 @@
 enum { V_MAX = 100000, TARGET = 50000 };
 
 struct machine {
-    MotionBlock *power, *move, *reset;
+    MotionBlock *power, *move, *reset, *slave, *gear;
     bool enable, execute, acknowledge;
     int32_t target;
-    MotionBlockOutputs moved, enabled;
-    MotionAxisStatus status;
+    MotionBlockOutputs moved, enabled, geared;
+    MotionAxisStatus status, follower;
 };
 
 static void application(MotionPlc *plc, void *user) {
@@ -22,6 +23,9 @@ static void application(MotionPlc *plc, void *user) {
     machine->moved = motion_move_absolute(machine->move, plc, machine->execute, machine->target, 0);
     motion_reset(machine->reset, plc, machine->acknowledge);
     motion_read_status(plc, 1, &machine->status);
+    bool slave = motion_power(machine->slave, plc, machine->enable).done && machine->enable;
+    machine->geared = motion_gear_in(machine->gear, plc, slave, 1, -3, 7);
+    motion_read_status(plc, 2, &machine->follower);
     motion_plc_set_digital_output(plc, 3, 4, machine->moved.done);
 }
 
@@ -62,6 +66,9 @@ int main(void) {
     set(controller, 714, 5);
     set(controller, 696, 5000); /* following error */
     set(controller, 702, 5000);
+    set(controller, 607, 8);    /* axis 2 is virtual */
+    set(controller, 643, V_MAX);
+    set(controller, 655, 200);
     expect(motion_controller_load(controller) == -1, "the loader has no objection");
     expect(motion_controller_save(controller), "the parameters are saved");
 
@@ -69,6 +76,8 @@ int main(void) {
     machine.power = motion_block_new(MOTION_BLOCK_KIND_POWER, 1);
     machine.move = motion_block_new(MOTION_BLOCK_KIND_MOVE_ABSOLUTE, 1);
     machine.reset = motion_block_new(MOTION_BLOCK_KIND_RESET, 1);
+    machine.slave = motion_block_new(MOTION_BLOCK_KIND_POWER, 2);
+    machine.gear = motion_block_new(MOTION_BLOCK_KIND_GEAR_IN, 2);
     expect(motion_move_absolute(machine.power, NULL, true, 1, 0).error, "a wrong block is an error");
 
     struct drive drive = {0};
@@ -86,6 +95,13 @@ int main(void) {
             printf("%.3f s: at %d\n", now / 1e6, machine.status.position);
             expect(abs(machine.status.position - TARGET) <= 5, "the axis is at the target");
             expect(outputs.digital[2] == 0x10, "Q3.4 says so");
+        }
+        if (now == 3900000) { /* at rest, both */
+            expect(machine.follower.state == MOTION_AXIS_STATE_SYNCHRONIZED_MOTION, "axis 2 is geared");
+            expect(machine.geared.in_velocity && machine.geared.busy, "axis 2 is in gear");
+            expect(machine.follower.position == (int32_t)floor(-3.0 * machine.status.position / 7.0),
+                   "axis 2 is where the encoder puts it");
+            printf("%.3f s: axis 2 at %d\n", now / 1e6, machine.follower.position);
         }
         if (now >= 4000000 && done == 1) { /* back, with a drive that sticks */
             machine.target = 0;
@@ -119,6 +135,8 @@ int main(void) {
     motion_block_free(machine.power);
     motion_block_free(machine.move);
     motion_block_free(machine.reset);
+    motion_block_free(machine.slave);
+    motion_block_free(machine.gear);
     free(storage);
     puts("as expected");
     return 0;

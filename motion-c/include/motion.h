@@ -25,6 +25,8 @@ typedef enum MotionAxisState {
   MOTION_AXIS_STATE_STOPPING,
   // Stopped by a failure, until reset.
   MOTION_AXIS_STATE_ERROR_STOP,
+  // Geared to an actual value input.
+  MOTION_AXIS_STATE_SYNCHRONIZED_MOTION,
 } MotionAxisState;
 
 // Which block.
@@ -49,6 +51,10 @@ typedef enum MotionBlockKind {
   MOTION_BLOCK_KIND_RESET,
   // Makes the actual position what is given.
   MOTION_BLOCK_KIND_SET_POSITION,
+  // Along with an actual value input.
+  MOTION_BLOCK_KIND_GEAR_IN,
+  // Ends gearing.
+  MOTION_BLOCK_KIND_GEAR_OUT,
 } MotionBlockKind;
 
 // A function block.
@@ -68,6 +74,8 @@ typedef struct MotionBlockOutputs {
   bool busy;
   // The axis follows this order.
   bool active;
+  // Active, and its velocity is reached, or the axis in gear.
+  bool in_velocity;
   // Another order took its place.
   bool command_aborted;
   // Failed.
@@ -163,7 +171,7 @@ typedef struct MotionAxisStatus {
   int32_t deviation;
   // `actual = nominal`: within the tolerance window of a position reached.
   bool at_target;
-  // Whether the velocity of a velocity order is reached.
+  // Whether the velocity of a velocity order is reached, or the axis in gear.
   bool in_velocity;
   // Whether the reference point was found since power-on.
   bool homed;
@@ -272,6 +280,26 @@ struct MotionBlockOutputs motion_set_position(struct MotionBlock *block,
                                               struct MotionPlc *plc,
                                               bool execute,
                                               int32_t position);
+
+// Gears the axis to actual value input `master`, 1…6, numerator/denominator of its units (neither is 0; < 0 is
+// backward), until another order. `in_velocity` tells that it is in gear; a failure of the master stops it.
+//
+// # Safety
+// `block` is from `motion_block_new`; `plc` is what the application was called with.
+struct MotionBlockOutputs motion_gear_in(struct MotionBlock *block,
+                                         struct MotionPlc *plc,
+                                         bool execute,
+                                         uint8_t master,
+                                         int32_t numerator,
+                                         uint32_t denominator);
+
+// Ends gearing: the axis goes on with the velocity that it has.
+//
+// # Safety
+// `block` is from `motion_block_new`; `plc` is what the application was called with.
+struct MotionBlockOutputs motion_gear_out(struct MotionBlock *block,
+                                          struct MotionPlc *plc,
+                                          bool execute);
 
 // Gives a frame that came on CAN 1 or 2 at `now` (µs) to the controller. False if there is no such bus
 // or the frame is none: a length above 8, an identifier out of range.

@@ -5,7 +5,8 @@ use core::ptr;
 
 use motion_core::application::MotionError;
 use motion_core::application::blocks::{
-    Halt, Home, Jog, MoveAbsolute, MoveRelative, MoveVelocity, Outputs, Power, Reset, SetPosition, Stop,
+    GearIn, GearOut, Halt, Home, Jog, MoveAbsolute, MoveRelative, MoveVelocity, Outputs, Power, Reset,
+    SetPosition, Stop,
 };
 
 use crate::plc::{Plc, plc};
@@ -34,6 +35,10 @@ pub enum BlockKind {
     Reset,
     /// Makes the actual position what is given.
     SetPosition,
+    /// Along with an actual value input.
+    GearIn,
+    /// Ends gearing.
+    GearOut,
 }
 
 /// A function block.
@@ -52,6 +57,8 @@ enum Any {
     Halt(Halt),
     Reset(Reset),
     SetPosition(SetPosition),
+    GearIn(GearIn),
+    GearOut(GearOut),
 }
 
 /// Outputs of a block.
@@ -64,6 +71,8 @@ pub struct BlockOutputs {
     pub busy: bool,
     /// The axis follows this order.
     pub active: bool,
+    /// Active, and its velocity is reached, or the axis in gear.
+    pub in_velocity: bool,
     /// Another order took its place.
     pub command_aborted: bool,
     /// Failed.
@@ -74,8 +83,8 @@ pub struct BlockOutputs {
 
 impl From<Outputs> for BlockOutputs {
     fn from(outputs: Outputs) -> Self {
-        let Outputs { done, busy, active, command_aborted, error, error_id } = outputs;
-        Self { done, busy, active, command_aborted, error, error_id: error_id.0 }
+        let Outputs { done, busy, active, in_velocity, command_aborted, error, error_id } = outputs;
+        Self { done, busy, active, in_velocity, command_aborted, error, error_id: error_id.0 }
     }
 }
 
@@ -84,6 +93,7 @@ const WRONG_BLOCK: BlockOutputs = BlockOutputs {
     done: false,
     busy: false,
     active: false,
+    in_velocity: false,
     command_aborted: false,
     error: true,
     error_id: MotionError::RANGE.0,
@@ -114,6 +124,10 @@ pub extern "C" fn motion_block_new(kind: u32, axis: u8) -> *mut Block {
         Any::Reset(Reset::new(axis))
     } else if is(BlockKind::SetPosition) {
         Any::SetPosition(SetPosition::new(axis))
+    } else if is(BlockKind::GearIn) {
+        Any::GearIn(GearIn::new(axis))
+    } else if is(BlockKind::GearOut) {
+        Any::GearOut(GearOut::new(axis))
     } else {
         return ptr::null_mut();
     };
@@ -296,6 +310,39 @@ pub unsafe extern "C" fn motion_set_position(
     call!(SetPosition, block, plc, |block, plc| {
         block.execute = execute;
         block.position = position;
+        block.call(plc).into()
+    })
+}
+
+/// Gears the axis to actual value input `master`, 1…6, numerator/denominator of its units (neither is 0; < 0 is
+/// backward), until another order. `in_velocity` tells that it is in gear; a failure of the master stops it.
+///
+/// # Safety
+/// `block` is from `motion_block_new`; `plc` is what the application was called with.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn motion_gear_in(
+    block: *mut Block,
+    plc: *mut Plc,
+    execute: bool,
+    master: u8,
+    numerator: i32,
+    denominator: u32,
+) -> BlockOutputs {
+    call!(GearIn, block, plc, |block, plc| {
+        block.execute = execute;
+        (block.master, block.numerator, block.denominator) = (master, numerator, denominator);
+        block.call(plc).into()
+    })
+}
+
+/// Ends gearing: the axis goes on with the velocity that it has.
+///
+/// # Safety
+/// `block` is from `motion_block_new`; `plc` is what the application was called with.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn motion_gear_out(block: *mut Block, plc: *mut Plc, execute: bool) -> BlockOutputs {
+    call!(GearOut, block, plc, |block, plc| {
+        block.execute = execute;
         block.call(plc).into()
     })
 }

@@ -6,9 +6,9 @@ mod controller;
 mod plc;
 
 pub use blocks::{
-    Block, BlockKind, BlockOutputs, motion_block_free, motion_block_new, motion_halt, motion_home,
-    motion_jog, motion_move_absolute, motion_move_relative, motion_move_velocity, motion_power, motion_reset,
-    motion_set_position, motion_stop,
+    Block, BlockKind, BlockOutputs, motion_block_free, motion_block_new, motion_gear_in, motion_gear_out,
+    motion_halt, motion_home, motion_jog, motion_move_absolute, motion_move_relative, motion_move_velocity,
+    motion_power, motion_reset, motion_set_position, motion_stop,
 };
 pub use can::{CanFrame, motion_can_receive, motion_can_timeout, motion_can_transmit};
 pub use controller::{

@@ -36,6 +36,8 @@ pub enum AxisState {
     Stopping,
     /// Stopped by a failure, until reset.
     ErrorStop,
+    /// Geared to an actual value input.
+    SynchronizedMotion,
 }
 
 /// What an axis is. Positions in user measuring units, velocities a second.
@@ -56,7 +58,7 @@ pub struct AxisStatus {
     pub deviation: i32,
     /// `actual = nominal`: within the tolerance window of a position reached.
     pub at_target: bool,
-    /// Whether the velocity of a velocity order is reached.
+    /// Whether the velocity of a velocity order is reached, or the axis in gear.
     pub in_velocity: bool,
     /// Whether the reference point was found since power-on.
     pub homed: bool,
@@ -84,6 +86,7 @@ pub unsafe extern "C" fn motion_read_status(plc: *mut Plc, axis: u8, status: *mu
             State::DiscreteMotion => AxisState::DiscreteMotion,
             State::ContinuousMotion => AxisState::ContinuousMotion,
             State::Homing => AxisState::Homing,
+            State::SynchronizedMotion => AxisState::SynchronizedMotion,
             State::Stopping => AxisState::Stopping,
             State::ErrorStop => AxisState::ErrorStop,
         },
@@ -161,6 +164,7 @@ texts! {
     MotionError::NOT_CONFIGURED => c"a parameter that the order needs is not set",
     MotionError::RANGE => c"a value of the order is out of range",
     MotionError::MOVING => c"the axis moves, standstill expected",
+    MotionError::NOT_GEARED => c"the axis is not geared",
 }
 
 /// What an error number means, as a static text.

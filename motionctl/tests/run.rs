@@ -167,6 +167,79 @@ fn a_drive_and_a_plant_are_moved_and_the_jitter_is_told() {
     assert!(said.iter().all(|document| document["event"] != "failure"), "{said:#?}");
 }
 
+/// Axis 2, which is virtual, goes along with axis 1's encoder, and is let go.
+#[test]
+fn an_axis_is_geared_to_another_one() {
+    let bench = Bench::new();
+    let config = r#"
+[parameters]
+0 = 2
+109 = 0
+602 = 0
+642 = 100000
+648 = 300
+654 = 100
+708 = 20
+714 = 20
+607 = 8
+643 = 100000
+655 = 100
+
+[[simulate]]
+kind = "plant"
+block = 1
+drive = "first-order"
+speed = 100000
+tau = 0.005
+
+[[program]]
+at = 0.05
+do = "power"
+axis = 1
+[[program]]
+at = 0.05
+do = "power"
+axis = 2
+[[program]]
+at = 0.1
+do = "gear-in"
+axis = 2
+input = 1
+numerator = -3
+denominator = 7
+[[program]]
+at = 0.2
+do = "move-absolute"
+axis = 1
+position = 7000
+[[program]]
+at = 1.2
+do = "gear-out"
+axis = 2
+[[program]]
+at = 1.3
+do = "move-absolute"
+axis = 1
+position = 0
+"#;
+    std::fs::write(bench.path("run.toml"), config).unwrap();
+    let ran = bench.run(&["run", "run.toml", "--for", "2.0", "--record", "run.csv"]).ends(0);
+    for words in ["gear-in: done", "synchronized-motion", "gear-out: done"] {
+        assert!(ran.stdout().contains(words), "{words:?}: {}", ran.stdout());
+    }
+    let recorded = std::fs::read_to_string(bench.path("run.csv")).unwrap();
+    let mut lines = recorded.lines();
+    let names: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let place = |name: &str| names.iter().position(|other| *other == name).unwrap();
+    let (axis, position) = (place("axis"), place("position"));
+    let last = |number: &str| -> f64 {
+        let mut own = recorded.lines().filter(|line| line.split(',').nth(axis) == Some(number));
+        own.next_back().unwrap().split(',').nth(position).unwrap().parse().unwrap()
+    };
+    assert!(last("1").abs() <= 20.0, "back: {}", last("1"));
+    assert!((last("2") + 3_000.0).abs() <= 9.0, "left behind: {}", last("2"));
+}
+
 #[test]
 fn the_histogram_is_drawn_for_people() {
     let bench = Bench::new();

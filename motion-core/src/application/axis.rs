@@ -16,6 +16,8 @@ pub enum State {
     ContinuousMotion,
     /// Looking for the reference point.
     Homing,
+    /// Geared to an actual value input.
+    SynchronizedMotion,
     /// Braking on a `Stop`, or held by it.
     Stopping,
     /// Stopped by a failure, until `Reset`.
@@ -42,7 +44,7 @@ pub struct AxisStatus {
     pub deviation: i32,
     /// `actual = nominal`: within the tolerance window of a position reached (`[708]`, `[714]`).
     pub at_target: bool,
-    /// Whether the velocity of `MoveVelocity` or `Jog` is reached.
+    /// Whether the velocity of `MoveVelocity` or `Jog` is reached, or the axis in gear after `GearIn`.
     pub in_velocity: bool,
     /// Whether the reference point was found since the controller was switched on.
     pub homed: bool,
@@ -81,6 +83,17 @@ pub enum Order {
     },
     /// Automatic calibration, `[792]`…`[810]`.
     Home,
+    /// Along with an actual value input, numerator/denominator of its units; in mode Control only.
+    GearIn {
+        /// Actual value input, 1…6; of type Virtual2 (6.6.1.5) it takes over another input or axis.
+        master: u8,
+        /// Backward < 0; not 0.
+        numerator: i32,
+        /// Not 0.
+        denominator: u32,
+    },
+    /// Ends gearing; the axis goes on with the velocity that it has.
+    GearOut,
     /// Brakes with the working deceleration; another order may follow at once.
     Halt,
     /// Brakes with the greatest deceleration; the axis takes no orders while it is held.

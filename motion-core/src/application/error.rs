@@ -37,6 +37,8 @@ impl MotionError {
     pub const RANGE: Self = Self(0x106);
     /// The axis moves; the order needs it at standstill.
     pub const MOVING: Self = Self(0x107);
+    /// The axis is not geared.
+    pub const NOT_GEARED: Self = Self(0x108);
 
     /// The error that a failure of the axis is.
     #[must_use]
@@ -74,6 +76,7 @@ impl MotionError {
             Self::NOT_CONFIGURED => "a parameter that the order needs is not set",
             Self::RANGE => "a value of the order is out of range",
             Self::MOVING => "the axis moves, standstill expected",
+            Self::NOT_GEARED => "the axis is not geared",
             Self(other) => return failure::text(Failure(u8::try_from(other).ok()?)),
         })
     }

@@ -5,10 +5,11 @@ use super::signals::{self, Wanted};
 use super::{Axis, Brake, Home, Motion, ramps, rounded};
 use crate::application::Progress;
 use crate::control::AxisOutput;
+use crate::input::ActualValue;
 use crate::trajectory::{self, Goal};
 
 impl Axis {
-    pub(super) fn run(&mut self, output: &mut AxisOutput) {
+    pub(super) fn run(&mut self, inputs: &[ActualValue; 6], output: &mut AxisOutput) {
         self.move_brake();
         let opening = matches!(self.brake, Brake::Opening(_));
         if !self.powered {
@@ -18,19 +19,20 @@ impl Axis {
         }
         match self.settings.mode {
             Mode::None => {}
-            Mode::Control => self.run_controlled(opening, output),
+            Mode::Control => self.run_controlled(opening, inputs, output),
             Mode::Ramps => self.run_ramps(opening, output),
             Mode::Signals => self.run_signals(opening, output),
         }
         if self.settings.is_virtual {
+            let before = core::mem::replace(&mut self.actual, rounded(self.generator.state().position));
+            self.wrap(before, 0);
             self.set = self.generator.state().position;
-            self.actual = rounded(self.set);
         }
         self.watch_window(output);
     }
 
     pub(super) fn move_brake(&mut self) {
-        let cycle = u32::from(self.cycle);
+        let cycle = self.cycle;
         self.brake = match self.brake {
             Brake::Opening(left) if left > cycle => Brake::Opening(left - cycle),
             Brake::Opening(_) => Brake::Open,
@@ -45,7 +47,7 @@ impl Axis {
         self.brake = match self.brake {
             Brake::Closed if self.settings.brake_open > 0 => {
                 // This cycle counts for it.
-                Brake::Opening(self.settings.brake_open.saturating_add(u32::from(self.cycle)))
+                Brake::Opening(self.settings.brake_open.saturating_add(self.cycle))
             }
             Brake::Opening(left) => Brake::Opening(left),
             _ => Brake::Open,
@@ -55,7 +57,7 @@ impl Axis {
     /// Set values with feedback: v = v_d + KSP · (s_d − s_act) (decision 19). s_d is that of the moment
     /// at which the actual position was read; v_d the mean until the next one, so that a drive which does
     /// what it is told is where it should be then.
-    pub(super) fn run_controlled(&mut self, opening: bool, output: &mut AxisOutput) {
+    fn run_controlled(&mut self, opening: bool, inputs: &[ActualValue; 6], output: &mut AxisOutput) {
         let feeds_back = self.feeds_back();
         let rests = self.motion == Motion::Idle && self.nominal.is_none();
         if !feeds_back && (rests || !self.controlled) {
@@ -64,9 +66,11 @@ impl Axis {
         let feedback = if feeds_back && !opening { self.settings.ksp * self.deviation() } else { 0.0 };
         self.set = self.generator.state().position;
         let mut velocity = feedback;
-        if !opening {
+        if opening {
+            self.wait_for_brake(inputs);
+        } else {
             let time = f64::from(self.cycle) / 1000.0;
-            velocity += (self.generator.step(time).position - self.set) / time;
+            velocity += self.advance(time, inputs) / time;
         }
         self.velocity = velocity.clamp(-self.settings.maximum, self.settings.maximum);
         if self.generator.arrived() {
@@ -89,7 +93,7 @@ impl Axis {
                 output.ended = Some(Progress::Done);
                 self.close_brake();
             }
-            Motion::Position { .. } | Motion::Home(_) | Motion::Velocity { .. } => {}
+            Motion::Position { .. } | Motion::Home(_) | Motion::Velocity { .. } | Motion::Gear(_) => {}
             // Nothing controls it until it is reset.
             Motion::Failed => self.brake = Brake::Closed,
             Motion::Idle => {}
@@ -187,14 +191,15 @@ impl Axis {
                 signals::approach(rest, self.sequence.is_fast(), &self.settings.jogs)
             }
             Motion::Velocity { velocity, fast } => Some(Wanted { forward: velocity > 0.0, fast }),
-            Motion::Home(Home::Found) | Motion::Idle | Motion::Failed | Motion::Braking { .. } => None,
+            Motion::Home(Home::Found) | Motion::Idle | Motion::Failed => None,
+            // There is no gearing by signals.
+            Motion::Braking { .. } | Motion::Gear(_) => None,
             Motion::Home(home) => {
                 let forward = self.settings.calibration == Calibration::Forward;
                 Some(Wanted { forward: forward == (home == Home::Referencing), fast: false })
             }
         };
-        let cycle = u32::from(self.cycle);
-        output.command.signals = self.sequence.cycle(wanted, &self.settings.jogs, cycle);
+        output.command.signals = self.sequence.cycle(wanted, &self.settings.jogs, self.cycle);
         if wanted.is_none() && self.sequence.stands() {
             self.arrive(output);
         }

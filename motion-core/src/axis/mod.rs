@@ -6,6 +6,7 @@
 //! or by direction, slow and fast (Signals).
 
 mod drive;
+mod gear;
 mod orders;
 mod ramps;
 mod settings;
@@ -14,10 +15,11 @@ mod watch;
 
 use crate::application::{AxisStatus, MotionError, Progress, State};
 use crate::control::{AxisControl, AxisInput, AxisOutput};
-use crate::input::Reading;
+use crate::input::{ActualValue, Reading};
 use crate::output::{Command, Signals};
 use crate::parameters::Values;
 use crate::trajectory::{self, Generator, Goal, Limits};
+use gear::Gear;
 use lb2::code::Failure;
 use settings::{Mode, Settings};
 use signals::Sequence;
@@ -33,6 +35,8 @@ enum Motion {
     Velocity { velocity: f64, fast: bool },
     /// Looking for the reference point.
     Home(Home),
+    /// Along with an actual value input.
+    Gear(Gear),
     /// Braking on an order; with the greatest deceleration on a `Stop`.
     Braking { stop: bool },
     /// Braking because of a failure.
@@ -55,10 +59,10 @@ enum Home {
 enum Brake {
     Closed,
     /// Opens in so many ms, `[744]`.
-    Opening(u32),
+    Opening(u16),
     Open,
     /// Closes in so many ms, `[750]`.
-    Closing(u32),
+    Closing(u16),
 }
 
 /// One axis.
@@ -140,17 +144,21 @@ impl AxisControl for Axis {
                     _ = self.generator.go(Goal::Velocity(velocity.clamp(-most, most)), limits);
                 }
             }
+            Motion::Gear(_) if self.settings.mode != Mode::Control => {
+                self.brake_softly();
+                self.motion = Motion::Braking { stop: false };
+            }
             _ => {}
         }
     }
 
-    fn cycle(&mut self, input: &AxisInput) -> AxisOutput {
+    fn cycle(&mut self, input: &AxisInput, inputs: &[ActualValue; 6]) -> AxisOutput {
         let mut output = AxisOutput::default();
         self.measure(input);
         self.power(input, &mut output);
         self.watch_drive(input.failure, &mut output);
         if self.powered {
-            self.watch(input, &mut output);
+            self.watch(input, inputs, &mut output);
             if input.reset && input.failure.is_none() && input.actual.reading == Reading::Real {
                 self.acknowledge();
             }
@@ -159,11 +167,11 @@ impl AxisControl for Axis {
             }
         }
         if let Some(order) = input.order {
-            self.order(order, &mut output);
+            self.order(order, inputs, &mut output);
         }
         let turned = self.turning_side().and_then(|side| self.settings.ends.get(side));
         self.follow_home(turned.is_some_and(|end| end.switched(input.digital)), input.actual.calibrated);
-        self.run(&mut output);
+        self.run(inputs, &mut output);
         self.report(input, &mut output);
         output
     }
@@ -179,14 +187,24 @@ impl Axis {
                 *target = target.wrapping_add(shift);
             }
         }
+        let before = self.actual;
         self.actual = if self.settings.is_virtual {
             rounded(self.generator.state().position)
         } else {
             input.actual.position
         };
+        self.wrap(before, shift);
         self.reading = input.actual.reading;
         self.homed |= input.actual.calibrated;
         self.held = input.held;
+    }
+
+    /// Where the actual value wraps, the set values do.
+    fn wrap(&mut self, before: i32, shift: i32) {
+        let step = i64::from(self.actual) - i64::from(before) - i64::from(shift);
+        if step.unsigned_abs() > 1 << 31 {
+            self.generator.shift(if step > 0 { TURN } else { -TURN });
+        }
     }
 
     fn power(&mut self, input: &AxisInput, output: &mut AxisOutput) {
@@ -247,7 +265,8 @@ impl Axis {
             _ if follows => self.actual,
             _ => rounded(self.set),
         };
-        let deviation = nominal.saturating_sub(self.actual);
+        let deviation =
+            if follows { nominal.saturating_sub(self.actual) } else { nominal.wrapping_sub(self.actual) };
         // A drive that is enabled by software: only while its control works (6.7.1.2).
         let by_software = self.settings.brake_open > 0 && self.brake == Brake::Closed && !self.feeds_back();
         let lost =
@@ -265,18 +284,16 @@ impl Axis {
         let in_velocity = match self.motion {
             Motion::Velocity { .. } if self.settings.mode == Mode::Signals => self.sequence.direction() != 0,
             Motion::Velocity { velocity, .. } => self.generator.arrived() && generator.velocity == velocity,
+            Motion::Gear(_) => self.generator.arrived(),
             _ => false,
         };
+        let set_velocity = self.set_velocity();
         output.status = AxisStatus {
             state: self.state(),
             position: self.actual,
-            velocity: if self.settings.is_virtual {
-                rounded(generator.velocity)
-            } else {
-                input.actual.velocity
-            },
+            velocity: if self.settings.is_virtual { rounded(set_velocity) } else { input.actual.velocity },
             nominal_position: nominal,
-            nominal_velocity: if follows { self.velocity } else { generator.velocity },
+            nominal_velocity: if follows { self.velocity } else { set_velocity },
             nominal_acceleration: if follows { 0.0 } else { generator.acceleration },
             deviation,
             at_target: self.at_target,
@@ -284,6 +301,12 @@ impl Axis {
             homed: self.homed,
             error: self.error,
         };
+    }
+
+    /// Velocity of the set values, units/s.
+    fn set_velocity(&self) -> f64 {
+        let own = self.generator.state().velocity;
+        if let Motion::Gear(gear) = self.motion { own + gear.velocity() } else { own }
     }
 
     fn state(&self) -> State {
@@ -297,13 +320,17 @@ impl Axis {
             Motion::Position { .. } | Motion::Braking { stop: false } => State::DiscreteMotion,
             Motion::Velocity { .. } => State::ContinuousMotion,
             Motion::Home(_) => State::Homing,
+            Motion::Gear(_) => State::SynchronizedMotion,
         }
     }
 }
 
-/// To the nearest whole unit, saturating.
+/// Units from one position to the next one that reads the same (7.2).
+const TURN: f64 = 4_294_967_296.0;
+
+/// To the nearest whole unit, wrapping.
 fn rounded(position: f64) -> i32 {
-    libm::round(position) as i32
+    libm::round(position) as i64 as i32
 }
 
 #[cfg(test)]

@@ -5,19 +5,23 @@ use super::{Axis, Home, Motion};
 use crate::application::{MotionError, Order, Progress};
 use crate::control::AxisOutput;
 use crate::failure::READING_LOST;
-use crate::input::Reading;
+use crate::input::{ActualValue, Reading};
 use crate::trajectory::Goal;
 
 impl Axis {
     /// Begins an order, or ends it as refused; a motion under way then goes on.
-    pub(super) fn order(&mut self, order: Order, output: &mut AxisOutput) {
-        match self.begin(order) {
+    pub(super) fn order(&mut self, order: Order, inputs: &[ActualValue; 6], output: &mut AxisOutput) {
+        match self.begin(order, inputs) {
+            // At a standstill it is the end of the motion.
+            Ok(()) if order == Order::GearOut && matches!(self.motion, Motion::Velocity { .. }) => {
+                output.ended = Some(Progress::Done);
+            }
             Ok(()) => {}
             Err(error) => output.ended = Some(Progress::Failed(error)),
         }
     }
 
-    fn begin(&mut self, order: Order) -> Result<(), MotionError> {
+    fn begin(&mut self, order: Order, inputs: &[ActualValue; 6]) -> Result<(), MotionError> {
         if !self.powered {
             return Err(MotionError::NOT_ENABLED);
         }
@@ -29,13 +33,13 @@ impl Axis {
                 return Err(self.error);
             }
             let stop = order == Order::Stop;
-            self.motion = Motion::Braking { stop };
-            (self.nominal, self.at_target) = (None, false);
             if stop {
                 self.brake_hard();
             } else {
                 self.brake_softly();
             }
+            self.motion = Motion::Braking { stop };
+            (self.nominal, self.at_target) = (None, false);
             return Ok(());
         }
         if self.error != MotionError::NONE && !self.error.is_limit() {
@@ -76,6 +80,10 @@ impl Axis {
                 self.begin_velocity(velocity, fast, self.settings.control_jog)
             }
             Order::Home => self.begin_home(),
+            Order::GearIn { master, numerator, denominator } => {
+                self.begin_gear((master, numerator, denominator), inputs)
+            }
+            Order::GearOut => self.begin_gear_out(),
             Order::Halt | Order::Stop => Ok(()),
         }
     }
@@ -107,13 +115,13 @@ impl Axis {
             return Err(MotionError::NOT_CONFIGURED);
         }
         self.admit(if velocity > 0.0 { 1 } else { -1 })?;
-        self.set_velocity(velocity)?;
+        self.reach_velocity(velocity)?;
         self.start(Motion::Velocity { velocity, fast }, controlled);
         Ok(())
     }
 
     /// The set values towards a velocity; nothing where signals do it.
-    fn set_velocity(&mut self, velocity: f64) -> Result<(), MotionError> {
+    fn reach_velocity(&mut self, velocity: f64) -> Result<(), MotionError> {
         if self.settings.mode == Mode::Signals {
             return Ok(());
         }
@@ -141,7 +149,7 @@ impl Axis {
             return Err(MotionError::NOT_CONFIGURED);
         }
         self.admit(if forward == (home == Home::Referencing) { 1 } else { -1 })?;
-        self.set_velocity(self.home_velocity(home))?;
+        self.reach_velocity(self.home_velocity(home))?;
         self.start(Motion::Home(home), self.settings.control_calibration);
         Ok(())
     }
@@ -169,12 +177,12 @@ impl Axis {
             self.brake_softly();
         } else {
             // Checked when the calibration began.
-            _ = self.set_velocity(self.home_velocity(next));
+            _ = self.reach_velocity(self.home_velocity(next));
         }
     }
 
     /// Only orders that lead off a limit switch are carried out while it is reached (6.8.1.1).
-    fn admit(&self, way: i64) -> Result<(), MotionError> {
+    pub(super) fn admit(&self, way: i64) -> Result<(), MotionError> {
         let [upper, lower] = self.limits;
         match (way, upper, lower) {
             (0.., Some(failure), _) | (..=0, _, Some(failure)) => Err(MotionError::from_failure(failure)),
@@ -182,15 +190,17 @@ impl Axis {
         }
     }
 
-    fn start(&mut self, motion: Motion, controlled: bool) {
+    pub(super) fn start(&mut self, motion: Motion, controlled: bool) {
         self.motion = motion;
         self.controlled = controlled;
         (self.nominal, self.at_target) = (None, false);
         self.open_brake();
     }
 
-    /// Where the position was not controlled, the set values begin where the axis is.
-    fn take_over(&mut self) {
+    /// Where the position was not controlled, the set values begin where the axis is; where it was geared,
+    /// with its velocity.
+    pub(super) fn take_over(&mut self) {
+        self.disengage();
         if self.motion == Motion::Failed || self.motion == Motion::Idle && !self.feeds_back() {
             self.settle();
         }
@@ -207,6 +217,7 @@ impl Axis {
     }
 
     fn brake_within(&mut self, limits: Option<crate::trajectory::Limits>) {
+        self.disengage();
         let stopped = limits.is_some_and(|limits| self.generator.go(Goal::Velocity(0.0), limits).is_ok());
         if !stopped {
             self.settle();

@@ -54,11 +54,11 @@ pub(super) struct Jogs {
     /// `[828]`, `[840]`.
     pub(super) run_out: [i32; 2],
     /// `[846]`.
-    pub(super) shut_down_time: u32,
+    pub(super) shut_down_time: u16,
     /// `[852]`.
-    pub(super) acceleration_time: u32,
+    pub(super) acceleration_time: u16,
     /// `[870]`.
-    pub(super) run_out_time: u32,
+    pub(super) run_out_time: u16,
     /// `[858]`: fast in manual operation.
     pub(super) fast_jog: bool,
     /// `[864]`: fast while positioning.
@@ -71,6 +71,8 @@ pub(super) struct Settings {
     pub(super) mode: Mode,
     /// `[606]`: none.
     pub(super) no_input: bool,
+    /// `[606]`: actual value input, 1…6.
+    pub(super) input: Option<u8>,
     /// `[606]`: the actual value is the nominal value.
     pub(super) is_virtual: bool,
     /// `[642]`, user measuring units/s.
@@ -94,9 +96,9 @@ pub(super) struct Settings {
     /// `[738]`.
     pub(super) control_in_position: bool,
     /// `[744]`, ms.
-    pub(super) brake_open: u32,
+    pub(super) brake_open: u16,
     /// `[750]`, ms.
-    pub(super) brake_close: u32,
+    pub(super) brake_close: u16,
     /// `[756]`…`[774]`: forward, backward.
     pub(super) jog: [JogVelocities; 2],
     /// `[780]`: keys swapped.
@@ -123,7 +125,7 @@ impl Settings {
     pub(super) fn read(values: &Values, at: usize) -> Self {
         let value = |first: u16| values.at(first, at);
         let number = |first: u16| f64::from(value(first));
-        let millis = |first: u16| u32::try_from(value(first)).unwrap_or(0);
+        let millis = |first: u16| u16::try_from(value(first)).unwrap_or(0);
         let yes = |first: u16| value(first) == 1;
         let maximum = number(642);
         let jog = |slow, fast| JogVelocities { slow: value(slow), fast: value(fast) };
@@ -144,6 +146,7 @@ impl Settings {
                 _ => Mode::None,
             },
             no_input: value(606) == 0,
+            input: u8::try_from(value(606)).ok().filter(|input| (1..=6).contains(input)),
             is_virtual: value(606) == 8,
             maximum,
             working: if value(684) > 0 { number(684).min(maximum) } else { maximum },
@@ -155,8 +158,8 @@ impl Settings {
             tool: value(720),
             control_in_stop: yes(732),
             control_in_position: yes(738),
-            brake_open: millis(744) * 10,
-            brake_close: millis(750) * 10,
+            brake_open: millis(744).saturating_mul(10),
+            brake_close: millis(750).saturating_mul(10),
             jog: [jog(756, 762), jog(768, 774)],
             jog_swapped: yes(780),
             control_jog: yes(786),

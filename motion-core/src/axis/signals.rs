@@ -21,7 +21,7 @@ pub(super) struct Sequence {
     /// Fast went off for a reversal.
     shutting_down: bool,
     /// Since the last change, ms.
-    since: u32,
+    since: u16,
 }
 
 impl Sequence {
@@ -50,7 +50,7 @@ impl Sequence {
     }
 
     /// One cycle of `cycle` ms.
-    pub(super) fn cycle(&mut self, wanted: Option<Wanted>, settings: &Jogs, cycle: u32) -> Signals {
+    pub(super) fn cycle(&mut self, wanted: Option<Wanted>, settings: &Jogs, cycle: u16) -> Signals {
         self.since = self.since.saturating_add(cycle);
         match (self.forward, wanted) {
             (None, None) => {}

@@ -7,7 +7,7 @@ use super::{Axis, Motion};
 use crate::application::{MotionError, Progress};
 use crate::control::{AxisInput, AxisOutput, PlcStop};
 use crate::failure::{HW_LIMIT_MINUS, HW_LIMIT_PLUS, READING_LOST, SW_LIMIT_MINUS, SW_LIMIT_PLUS};
-use crate::input::Reading;
+use crate::input::{ActualValue, Reading};
 
 impl Axis {
     /// Tells a failure of the drive once, also of an axis that is not enabled.
@@ -18,13 +18,18 @@ impl Axis {
     }
 
     /// Failures of drive and input, following error, limit switches: all in the cycle in which they come.
-    pub(super) fn watch(&mut self, input: &AxisInput, output: &mut AxisOutput) {
+    pub(super) fn watch(&mut self, input: &AxisInput, inputs: &[ActualValue; 6], output: &mut AxisOutput) {
         if let Some(failure) = input.failure.or(input.actual.failure).or_else(|| self.blind(output)) {
             let error = MotionError::from_failure(failure);
             if self.motion != Motion::Failed || self.error != error {
                 self.controlled = false;
                 self.fail(error, output);
             }
+            return;
+        }
+        if let Some(failure) = self.gear_failure(inputs) {
+            self.fail(MotionError::from_failure(failure), output);
+            output.failure = Some(failure);
             return;
         }
         if self.settings.mode == Mode::Control && self.feeds_back() && self.motion != Motion::Failed {
@@ -43,7 +48,7 @@ impl Axis {
                 return;
             }
         }
-        self.watch_limits(input, output);
+        self.watch_limits(input, inputs, output);
     }
 
     /// Without an actual value no axis stays enabled that had one, and none moves that had none.
@@ -59,7 +64,12 @@ impl Axis {
         }
     }
 
-    pub(super) fn watch_limits(&mut self, input: &AxisInput, output: &mut AxisOutput) {
+    pub(super) fn watch_limits(
+        &mut self,
+        input: &AxisInput,
+        inputs: &[ActualValue; 6],
+        output: &mut AxisOutput,
+    ) {
         let before = self.limits;
         let homing = matches!(self.motion, Motion::Home(_));
         let [upper, lower] = self.settings.ends;
@@ -84,13 +94,13 @@ impl Axis {
         let turning = self.turning_side();
         for side in 0..2 {
             let Some(&Some(failure)) = self.limits.get(side) else { continue };
-            let towards = if side == 0 { self.direction() > 0 } else { self.direction() < 0 };
+            let towards = if side == 0 { self.direction(inputs) > 0 } else { self.direction(inputs) < 0 };
             let fresh = before.get(side).copied().flatten().is_none();
             // The calibration's turning point is no failure.
             if turning == Some(side) && homing || self.motion == Motion::Failed {
                 continue;
             }
-            if towards || fresh && !self.retreats(side) {
+            if towards || fresh && !self.retreats(side, inputs) {
                 self.fail(MotionError::from_failure(failure), output);
                 output.failure = Some(failure);
             }
@@ -101,8 +111,8 @@ impl Axis {
     }
 
     /// Whether the present motion leads off a limit switch.
-    pub(super) fn retreats(&self, side: usize) -> bool {
-        if side == 0 { self.direction() < 0 } else { self.direction() > 0 }
+    pub(super) fn retreats(&self, side: usize, inputs: &[ActualValue; 6]) -> bool {
+        if side == 0 { self.direction(inputs) < 0 } else { self.direction(inputs) > 0 }
     }
 
     /// The side on which an automatic calibration turns: its hardware limit switch there is the turning
@@ -116,12 +126,12 @@ impl Axis {
     }
 
     /// Direction in which the axis is driven now.
-    pub(super) fn direction(&self) -> i8 {
+    pub(super) fn direction(&self, inputs: &[ActualValue; 6]) -> i8 {
         if self.settings.mode == Mode::Signals {
             return self.sequence.direction();
         }
         let velocity =
-            if self.settings.mode == Mode::Ramps { self.velocity } else { self.generator.state().velocity };
+            if self.settings.mode == Mode::Ramps { self.velocity } else { self.velocity_now(inputs) };
         if velocity == 0.0 {
             0
         } else if velocity > 0.0 {
@@ -135,11 +145,11 @@ impl Axis {
         if self.motion != Motion::Idle {
             output.ended = Some(Progress::Failed(error));
         }
+        self.brake_hard();
         self.error = error;
         self.motion = Motion::Failed;
         self.at_target = false;
         self.nominal = None;
-        self.brake_hard();
     }
 
     /// Acknowledges a failure, once the axis stands and its cause is gone.
@@ -166,18 +176,19 @@ impl Axis {
         if self.motion == Motion::Failed {
             return;
         }
-        if self.motion != Motion::Idle {
-            output.ended = Some(Progress::Aborted);
-            self.motion = Motion::Braking { stop: false };
-            self.nominal = None;
-            self.at_target = false;
-        }
+        let idle = self.motion == Motion::Idle;
         match stop {
             PlcStop::Control => {
                 self.controlled = false;
                 self.brake_hard();
             }
             PlcStop::Regulate => self.brake_softly(),
+        }
+        if !idle {
+            output.ended = Some(Progress::Aborted);
+            self.motion = Motion::Braking { stop: false };
+            self.nominal = None;
+            self.at_target = false;
         }
     }
 }

@@ -60,6 +60,6 @@ pub trait AxisControl {
     /// Takes over the parameters of axis `at`, 0…5, and the length of a cycle, ms; also while moving.
     fn configure(&mut self, values: &Values, at: usize, cycle: u16);
 
-    /// One cycle.
-    fn cycle(&mut self, input: &AxisInput) -> AxisOutput;
+    /// One cycle. `inputs` are all actual value inputs, for an axis that goes along with one of them.
+    fn cycle(&mut self, input: &AxisInput, inputs: &[ActualValue; 6]) -> AxisOutput;
 }

@@ -179,16 +179,16 @@ impl<A: AxisControl> Control<A> {
         let stop = self.plc_run(digital);
         self.read_inputs(inputs, digital, drives);
         let mut commands: [Option<(Command, bool)>; COUNT] = Default::default();
+        self.quantities.iter_mut().for_each(|own| own.shift = 0);
         for at in 0..COUNT {
             let (Some(axis), Some(access), Some(&Some(route))) =
                 (self.axes.get_mut(at), self.access.get_mut(at), self.settings.axes.get(at))
             else {
                 continue;
             };
-            let actual = self.values;
             let input = AxisInput {
                 actual: match route.source {
-                    ActualSource::Input(input) => actual.get(input).copied().unwrap_or_default(),
+                    ActualSource::Input(input) => self.values.get(input).copied().unwrap_or_default(),
                     ActualSource::Stepper | ActualSource::Virtual | ActualSource::None => ActualValue {
                         position: self
                             .quantities
@@ -208,7 +208,7 @@ impl<A: AxisControl> Control<A> {
                 stop,
                 failure: route.failure(drives),
             };
-            let output = axis.cycle(&input);
+            let output = axis.cycle(&input, &self.values);
             let number = at as u8 + 1;
             for failure in [input.actual.failure, output.failure].into_iter().flatten() {
                 log(StoredFailure { axis: number, failure });
@@ -226,6 +226,7 @@ impl<A: AxisControl> Control<A> {
             }
             if let Some(own) = self.quantities.get_mut(at) {
                 own.position = output.status.nominal_position;
+                own.shift = input.actual.shift;
                 own.velocity = libm::round(output.status.nominal_velocity) as i32;
             }
         }

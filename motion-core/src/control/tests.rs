@@ -21,7 +21,7 @@ impl AxisControl for Puppet {
         self.cycle = cycle;
     }
 
-    fn cycle(&mut self, input: &AxisInput) -> AxisOutput {
+    fn cycle(&mut self, input: &AxisInput, _inputs: &[ActualValue; 6]) -> AxisOutput {
         self.seen.push(*input);
         match input.order {
             Some(Order::MoveVelocity { velocity }) => self.velocity = velocity,

@@ -31,6 +31,8 @@ const CAN_BITS: u32 = 20;
 pub struct AxisQuantities {
     /// Nominal position, user measuring units.
     pub position: i32,
+    /// How far calibration moved the scale of the position in this cycle.
+    pub shift: i32,
     /// Nominal velocity, user measuring units per second.
     pub velocity: i32,
     /// Pulses put out to the stepper motor, backward ones counted down; wraps.
@@ -217,7 +219,12 @@ impl ActualValueInput {
             return self.value;
         }
         let position = self.scaled(self.count);
+        // What moved the scale of the source moves the one here, and is no movement.
+        let moved = self.source_shift(sources);
+        let shift = position.wrapping_sub(self.scaled(self.count.wrapping_sub(moved)));
+        let previous = previous.wrapping_add(shift);
         let step = position.wrapping_sub(previous);
+        self.value.shift = self.value.shift.wrapping_add(shift);
         if !self.settled {
             // The first reading: where the axis is, not a movement.
             self.value.shift = self.value.shift.wrapping_add(step);
@@ -231,7 +238,7 @@ impl ActualValueInput {
                 let rate = delta.saturating_mul(1000) / i64::from(sources.cycle.max(1));
                 rate.clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32
             };
-            self.value.frequency = per_second(self.count.wrapping_sub(count));
+            self.value.frequency = per_second(self.count.wrapping_sub(count).wrapping_sub(moved));
             self.value.velocity = per_second(i64::from(step));
         }
         self.value.position = position;
@@ -287,6 +294,17 @@ impl ActualValueInput {
             }
             _ => None,
         }
+    }
+
+    /// How far the scale of what this input takes over moved in this cycle, counts.
+    fn source_shift(&self, sources: &Sources<'_>) -> i64 {
+        let Kind::Virtual2 { quantity, source } = self.settings.kind else { return 0 };
+        let shift = match quantity {
+            Quantity::ActualValue => sources.inputs.get(source).map(|input| input.shift),
+            Quantity::Position => sources.axes.get(source).map(|axis| axis.shift),
+            Quantity::Frequency | Quantity::Velocity | Quantity::Steps => None,
+        };
+        shift.unwrap_or(0).into()
     }
 
     /// Takes the reading of this cycle into `count`, if there is one.

@@ -161,7 +161,7 @@ fn parameter_156_is_the_quantity_taken_over() {
         let mut rig = rig(0, &[(100, 4), (156, choice), (163, 3)]);
         rig.inputs[2] =
             ActualValue { position: 1, frequency: 2, reading: Reading::Real, ..ActualValue::default() };
-        rig.axes[2] = AxisQuantities { position: 3, velocity: 4, steps: 5 };
+        rig.axes[2] = AxisQuantities { position: 3, velocity: 4, steps: 5, ..AxisQuantities::default() };
         rig.cycle().position
     };
     assert_eq!([0, 1, 2, 3, 4].map(position), [1, 2, 3, 4, 5]);
@@ -208,6 +208,35 @@ fn virtual2_passes_on_what_its_source_stands_for() {
     rig.cycle();
     rig.inputs[2].reading = Reading::Lost;
     assert_eq!((rig.cycle().reading, rig.cycle().reading), (Reading::Extrapolated, Reading::Lost));
+}
+
+/// A source that is calibrated moves its scale: here too it is no movement, and no jump.
+#[test]
+fn virtual2_moves_its_scale_with_the_source() {
+    for (choice, moves) in [(0, true), (2, true), (1, false), (3, false), (4, false)] {
+        let mut rig = rig(0, &[(100, 4), (156, choice), (163, 3), (205, 2), (212, 1), (184, 100)]);
+        let mut seen = |position, shift| {
+            rig.inputs[2] = ActualValue {
+                position,
+                shift,
+                frequency: 7,
+                reading: Reading::Real,
+                ..ActualValue::default()
+            };
+            rig.axes[2] = AxisQuantities { position, shift, velocity: 7, steps: 7 };
+            let value = rig.cycle();
+            (value.position, value.shift, value.velocity, value.failure)
+        };
+        let first = seen(0, 0);
+        if moves {
+            assert_eq!(first, (0, 0, 0, None));
+            assert_eq!(seen(10, 0), (20, 0, 10_000, None));
+            assert_eq!(seen(5_012, 5_000), (10_024, 10_000, 2_000, None));
+            assert_eq!(seen(5_022, 0), (10_044, 0, 10_000, None));
+        } else {
+            assert_eq!(seen(0, 5_000), (14, 0, 0, None));
+        }
+    }
 }
 
 /// `[170]`: 1234 counts a second, exact over any number of cycles, both ways.

@@ -16,6 +16,8 @@ const FILE: &str = r#"CONFIG.toml:
   [[program]]           at = seconds, do = …
     power, home, move-absolute, move-relative, move-velocity, jog, stop, halt, reset, set-position
                         axis = 1, position, distance, velocity, for = seconds, …
+    gear-in, gear-out   axis = 2, input = 1 (actual value input; type Virtual2 for another axis),
+                        numerator = -3, denominator = 7, for = seconds
     write               bus = "can1", object = 1 (OUT 1 to 4), data = "A5", period = seconds
     send                bus = "can1", channel = 1 (CAN Link, 1 to 14), data = "E2 04", period = seconds
     scan                bus = "can1": as by hand, with all axes at rest"#;

@@ -3,7 +3,8 @@
 use core::time::Duration;
 
 use motion_core::application::blocks::{
-    Halt, Home, Jog, MoveAbsolute, MoveRelative, MoveVelocity, Outputs, Power, Reset, SetPosition, Stop,
+    GearIn, GearOut, Halt, Home, Jog, MoveAbsolute, MoveRelative, MoveVelocity, Outputs, Power, Reset,
+    SetPosition, Stop,
 };
 use motion_core::application::{Application, MotionError, Plc, State};
 use pdo::Payload;
@@ -142,7 +143,9 @@ impl Application for Program {
                 Outcome::Failed(outputs.error_id)
             } else if outputs.command_aborted {
                 Outcome::Aborted
-            } else if outputs.done && (step.end.is_none() || !asked) || !asked && !outputs.busy {
+            } else if (outputs.done || outputs.in_velocity) && (step.end.is_none() || !asked)
+                || !asked && !outputs.busy
+            {
                 Outcome::Done
             } else {
                 continue;
@@ -161,6 +164,16 @@ macro_rules! executed {
             block.call(plc)
         })
     }};
+}
+
+/// A motion without an end of its own, which is halted when it is not asked for any more.
+fn held(axis: u8, mut motion: Block) -> Block {
+    let mut halt = Halt::new(axis);
+    Box::new(move |plc, asked| {
+        let outputs = motion(plc, asked);
+        halt.execute |= !asked && outputs.busy;
+        if halt.execute { halt.call(plc) } else { outputs }
+    })
 }
 
 /// An action that is done as soon as it is begun.
@@ -214,7 +227,7 @@ fn block(step: &Step) -> Result<Block, Exit> {
         Action::MoveVelocity => {
             let mut block = MoveVelocity::new(axis);
             block.velocity = step.velocity.unwrap_or(0);
-            executed!(block)
+            held(axis, executed!(block))
         }
         Action::Jog => {
             let mut jog = Jog::new(axis);
@@ -225,6 +238,13 @@ fn block(step: &Step) -> Result<Block, Exit> {
                 jog.call(plc)
             })
         }
+        Action::GearIn => {
+            let mut block = GearIn::new(axis);
+            block.master = step.input.unwrap_or(0);
+            (block.numerator, block.denominator) = (step.numerator.unwrap_or(0), step.denominator);
+            held(axis, executed!(block))
+        }
+        Action::GearOut => executed!(GearOut::new(axis)),
         Action::Stop => executed!(Stop::new(axis)),
         Action::Halt => executed!(Halt::new(axis)),
         Action::Reset => executed!(Reset::new(axis)),

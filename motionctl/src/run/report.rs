@@ -21,6 +21,7 @@ const fn state_name(state: State) -> &'static str {
         State::DiscreteMotion => "discrete-motion",
         State::ContinuousMotion => "continuous-motion",
         State::Homing => "homing",
+        State::SynchronizedMotion => "synchronized-motion",
         State::Stopping => "stopping",
         State::ErrorStop => "error-stop",
     }

@@ -23,6 +23,8 @@ pub(super) enum Action {
     Halt,
     Reset,
     SetPosition,
+    GearIn,
+    GearOut,
     /// Process data of an object OUT.
     Write,
     /// A channel of CAN Link.
@@ -44,6 +46,8 @@ impl Action {
             Self::Halt => "halt",
             Self::Reset => "reset",
             Self::SetPosition => "set-position",
+            Self::GearIn => "gear-in",
+            Self::GearOut => "gear-out",
             Self::Write => "write",
             Self::Send => "send",
             Self::Scan => "scan",
@@ -73,6 +77,11 @@ pub(super) struct Step {
     pub(super) position: Option<i32>,
     pub(super) distance: Option<i32>,
     pub(super) velocity: Option<i32>,
+    /// Of gear-in: actual value input 1…6, and the ratio of the axis' way to its own.
+    pub(super) input: Option<u8>,
+    pub(super) numerator: Option<i32>,
+    #[serde(default = "one")]
+    pub(super) denominator: u32,
     /// Of jog: direction and speed.
     #[serde(default = "yes")]
     pub(super) forward: bool,
@@ -81,9 +90,13 @@ pub(super) struct Step {
     /// Of power: on or off.
     #[serde(default = "yes")]
     pub(super) on: bool,
-    /// Seconds that jog, stop or a velocity is held.
+    /// Seconds that jog, stop, a velocity or gearing is held.
     #[serde(rename = "for")]
     pub(super) duration: Option<f64>,
+}
+
+const fn one() -> u32 {
+    1
 }
 
 const fn yes() -> bool {
@@ -136,6 +149,16 @@ impl Step {
             Action::MoveRelative => self.need(self.distance, "distance").map(drop),
             Action::MoveVelocity => self.need(self.velocity, "velocity").map(drop),
             Action::Jog => self.need(self.duration, "for").map(drop),
+            Action::GearIn => {
+                let input = self.need(self.input, "input")?;
+                if !(1..=6).contains(&input) {
+                    return Err(self.wrong(format!("input {input}, 1 to 6 expected")));
+                }
+                if self.need(self.numerator, "numerator")? == 0 || self.denominator == 0 {
+                    return Err(self.wrong("numerator and denominator other than 0 expected"));
+                }
+                Ok(())
+            }
             _ => Ok(()),
         }
     }

@@ -15,6 +15,8 @@ pub struct Outputs {
     pub busy: bool,
     /// The axis follows this order.
     pub active: bool,
+    /// Active, and its velocity is reached (`MoveVelocity`, `Jog`), or the axis in gear (`GearIn`).
+    pub in_velocity: bool,
     /// Another order took its place.
     pub command_aborted: bool,
     /// Failed.
@@ -25,13 +27,24 @@ pub struct Outputs {
 
 impl Outputs {
     const fn failed(error_id: MotionError) -> Self {
-        Self { done: false, busy: false, active: false, command_aborted: false, error: true, error_id }
+        Self {
+            done: false,
+            busy: false,
+            active: false,
+            in_velocity: false,
+            command_aborted: false,
+            error: true,
+            error_id,
+        }
     }
 
-    fn of(progress: Progress) -> Self {
-        match progress {
+    fn of(access: &AxisAccess, ticket: Ticket) -> Self {
+        match access.progress(ticket) {
             Progress::Waiting => Self { busy: true, ..Self::default() },
-            Progress::Active => Self { busy: true, active: true, ..Self::default() },
+            Progress::Active => {
+                let in_velocity = access.status().in_velocity;
+                Self { busy: true, active: true, in_velocity, ..Self::default() }
+            }
             Progress::Done => Self { done: true, ..Self::default() },
             Progress::Aborted => Self { command_aborted: true, ..Self::default() },
             Progress::Failed(error) => Self::failed(error),
@@ -80,7 +93,7 @@ impl Execution {
             }
         }
         if let Some(ticket) = self.ticket {
-            self.outputs = Outputs::of(access.progress(ticket));
+            self.outputs = Outputs::of(access, ticket);
             if !self.outputs.busy {
                 self.ticket = None;
             }
@@ -146,8 +159,8 @@ order_block! {
 }
 
 order_block! {
-    /// Moves an axis with a velocity until another order comes. Done means that the velocity is
-    /// reached; the block stays busy and active then.
+    /// Moves an axis with a velocity until another order comes: the block stays busy. `in_velocity` means
+    /// that it is reached.
     MoveVelocity {
         /// User measuring units per second, backward < 0.
         velocity: i32
@@ -157,6 +170,34 @@ order_block! {
 order_block! {
     /// Looks for the reference point as `[804]` says. Done when it is found and the axis at rest.
     Home {} => |_| Order::Home
+}
+
+order_block! {
+    /// Gears an axis to an actual value input until another order comes: the block stays busy. `in_velocity`
+    /// means that it is in gear; from then on the way of the axis is that of the master times
+    /// numerator/denominator, to the unit.
+    ///
+    /// The axis gets there within its working acceleration and jerk; what the master has gone meanwhile is
+    /// not made up for. The master is any input: an encoder, or with type Virtual2 another input or axis,
+    /// whose multiplier is one more ratio. If it fails, or goes faster than V max. `[642]` allows, the axis
+    /// is stopped with that failure (`READING_LOST`, `DELTA_S_MAX`…).
+    GearIn {
+        /// Actual value input, 1…6.
+        master: u8,
+        /// Backward < 0; not 0.
+        numerator: i32,
+        /// Not 0.
+        denominator: u32
+    } => |block| Order::GearIn {
+        master: block.master,
+        numerator: block.numerator,
+        denominator: block.denominator
+    }
+}
+
+order_block! {
+    /// Ends gearing: the axis goes on with the velocity that it has, as after `MoveVelocity`. Done at once.
+    GearOut {} => |_| Order::GearOut
 }
 
 order_block! {
@@ -236,9 +277,7 @@ impl Jog {
             let order = match wanted {
                 Some((forward, fast)) => Some(Order::Jog { forward, fast }),
                 // Only what this block moves is halted.
-                None => {
-                    self.ticket.filter(|&ticket| Outputs::of(axis.progress(ticket)).busy).map(|_| Order::Halt)
-                }
+                None => self.ticket.filter(|&ticket| Outputs::of(axis, ticket).busy).map(|_| Order::Halt),
             };
             self.ticket = None;
             if let Some(order) = order {
@@ -249,7 +288,7 @@ impl Jog {
             }
         }
         match self.ticket {
-            Some(ticket) => Outputs::of(axis.progress(ticket)),
+            Some(ticket) => Outputs::of(axis, ticket),
             None if wanted.is_some() => self.outputs,
             None => Outputs::default(),
         }
@@ -346,7 +385,7 @@ impl SetPosition {
         let rising = rising_edge(&mut self.executed, self.execute);
         if rising {
             self.outputs = match plc.axis(self.axis).and_then(|axis| axis.set_position(self.position)) {
-                Ok(()) => Outputs::of(Progress::Done),
+                Ok(()) => Outputs { done: true, ..Outputs::default() },
                 Err(error) => Outputs::failed(error),
             };
         } else if !self.execute {

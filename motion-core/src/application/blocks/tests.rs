@@ -177,6 +177,29 @@ fn jog_runs_while_one_direction_is_asked_for() {
     assert_eq!(rig.axis().take(), None);
 }
 
+/// `in_velocity` belongs to the order that is carried out.
+#[test]
+fn velocity_and_gearing_tell_when_they_are_reached() {
+    let mut rig = Rig::new(State::Standstill);
+    let mut gear = GearIn { master: 3, numerator: -2, denominator: 5, execute: true, ..GearIn::new(1) };
+    let mut velocity = MoveVelocity { velocity: 9, ..MoveVelocity::new(1) };
+    rig.run(|plc| gear.call(plc));
+    assert_eq!(rig.axis().take(), Some(Order::GearIn { master: 3, numerator: -2, denominator: 5 }));
+    assert!(!rig.run(|plc| gear.call(plc)).in_velocity);
+    let reached = AxisStatus { in_velocity: true, ..*rig.axis().status() };
+    rig.axis().set_status(reached);
+    let outputs = rig.run(|plc| gear.call(plc));
+    assert!(outputs.in_velocity && outputs.busy && !outputs.done);
+    velocity.execute = true;
+    assert!(!rig.run(|plc| velocity.call(plc)).in_velocity, "not taken yet");
+    rig.axis().take();
+    let (first, second) = rig.run(|plc| (gear.call(plc), velocity.call(plc)));
+    assert!(!first.in_velocity && first.command_aborted && second.in_velocity);
+    let mut out = GearOut { execute: true, ..GearOut::new(1) };
+    rig.run(|plc| out.call(plc));
+    assert_eq!(rig.axis().take(), Some(Order::GearOut));
+}
+
 #[test]
 fn power_reset_status_and_position_act_at_once() {
     let mut rig = Rig::new(State::Disabled);

@@ -18,6 +18,37 @@ fn parameter_600_is_the_controlling_mode() {
     );
 }
 
+/// 7.2: the actual value wraps at ±2^31 and an axis goes on, controlled or not, with an encoder or virtual,
+/// and is positioned beyond.
+#[test]
+fn a_velocity_goes_on_where_the_position_wraps() {
+    for changes in [&[][..], &[(600, 3), (894, 4_000)], &[(606, 8)]] {
+        for sign in [1, -1] {
+            let mut rig = rig(&[&[(696, 50), (702, 50)], changes].concat());
+            let edge = if sign > 0 { i32::MAX } else { i32::MIN };
+            let start = edge - sign * 9_000;
+            rig.position = f64::from(start);
+            rig.input.actual.shift = start;
+            rig.input.actual.position = start;
+            rig.cycle();
+            rig.order(Order::MoveVelocity { velocity: sign * 10_000 });
+            for _ in 0..2_000 {
+                let status = rig.cycle().status;
+                assert_eq!(status.state, State::ContinuousMotion, "{status:?}");
+                assert!(rig.output.command.velocity.abs() <= 10_000.0 && status.deviation.abs() <= 50);
+            }
+            assert_eq!((rig.output.status.position < 0, rig.failures.len()), (sign > 0, 0));
+            let target = edge.wrapping_add(sign * 30_000);
+            rig.order(Order::Halt);
+            rig.run(600);
+            rig.go(target);
+            let took = rig.until("arrived", |rig| rig.output.status.at_target);
+            assert!(took < 6_000, "{changes:?}: {took} ms");
+            assert!((rig.output.status.position - target).abs() <= 5);
+        }
+    }
+}
+
 /// `[606]`: Virtual follows its set values without deviation; None takes no orders.
 #[test]
 fn parameter_606_virtual_is_an_axis_without_following_error() {

@@ -4,6 +4,7 @@
 mod calibration;
 mod control;
 mod failures;
+mod gear;
 mod limits;
 mod ramps;
 mod signals;
@@ -21,6 +22,8 @@ pub(super) struct Rig {
     values: Values,
     pub(super) axis: Axis,
     pub(super) input: AxisInput,
+    /// All actual value inputs.
+    pub(super) inputs: [ActualValue; 6],
     pub(super) output: AxisOutput,
     /// Time constant of the drive, s; 0 = follows at once.
     lag: f64,
@@ -59,6 +62,7 @@ pub(super) fn rig(changes: &[(u16, i32)]) -> Rig {
             stop: None,
             failure: None,
         },
+        inputs: [ActualValue::default(); 6],
         output: AxisOutput::default(),
         lag: 0.0,
         gain: 1.0,
@@ -77,9 +81,9 @@ impl Rig {
     /// One cycle of 1 ms: the axis, then its plant.
     pub(super) fn cycle(&mut self) -> AxisOutput {
         let before = self.input.actual.position;
-        self.input.actual.position = self.position.round() as i32;
-        self.input.actual.velocity = (self.input.actual.position - before) * 1000;
-        self.output = self.axis.cycle(&self.input);
+        self.input.actual.position = self.position.round() as i64 as i32;
+        self.input.actual.velocity = self.input.actual.position.wrapping_sub(before) * 1000;
+        self.output = self.axis.cycle(&self.input, &self.inputs);
         self.input.order = None;
         self.input.reset = false;
         self.input.stop = None;
