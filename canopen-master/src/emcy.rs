@@ -303,6 +303,12 @@ impl<const N: usize> Producer<N> {
         self.known = 0;
     }
 
+    /// Forgets the history and what waits; the inhibit time goes on.
+    pub const fn clear(&mut self) {
+        self.known = 0;
+        self.len = 0;
+    }
+
     /// The emergency that may be sent now.
     pub fn poll_transmit(&mut self, now: Duration) -> Option<Emergency> {
         if !is_due(self.poll_timeout(), now) {

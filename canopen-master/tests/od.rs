@@ -73,7 +73,7 @@ impl Hooks for App {
 
 /// One RPDO and one TPDO with up to 4 objects.
 struct Device<'a> {
-    objects: Objects<'a, App, 1, 1, 4>,
+    objects: Objects<Dictionary<'a, App>, 1, 1, 4>,
     server: Server,
     client: Client<Vec<u8>>,
 }
@@ -252,6 +252,9 @@ fn mapping_at_run_time() {
     assert_eq!(device.write(0x1600, 0, &[9]), Err(AbortCode::PDO_LENGTH));
     device.write(0x1600, 0, &[3]).unwrap();
     device.write(0x1400, 2, &[1]).unwrap();
+    assert_eq!(device.write(0x1800, 1, &cob_id(0xC000_0181)), Ok(()));
+    assert_eq!(device.write(0x1800, 6, &[241]), Err(AbortCode::TOO_HIGH), "SYNC counts to 240");
+    assert_eq!(device.write(0x1800, 6, &[240]), Ok(()));
     assert_eq!(device.write(0x1400, 1, &cob_id(0x601)), Err(AbortCode::INVALID_VALUE), "restricted");
     assert_eq!(device.write(0x1400, 1, &cob_id(0x2000_0201)), Err(AbortCode::INVALID_VALUE), "29 bits");
     device.write(0x1400, 1, &cob_id(0x333)).unwrap();
@@ -287,6 +290,50 @@ fn process_data() {
     pdos.stop();
     pdos.trigger(0);
     assert_eq!(pdos.poll_transmit(Duration::ZERO, &dictionary), None);
+}
+
+/// What a device does to its own PDOs, such as choosing a mapping or holding an event back.
+#[test]
+fn the_device_changes_its_pdos() {
+    let mut memory = [0; TABLE.memory()];
+    let Device { objects: Objects { dictionary, mut pdos }, .. } = Device::new(&mut memory);
+    let mut slot = pdos.tpdo_slots()[0];
+    slot.mapping = Mapping::new(&[Mapped::new(0x6000, 1, 8), Mapped::new(0x6000, 1, 8)]).unwrap();
+    assert!(pdos.set_tpdo_slot(0, slot) && !pdos.set_tpdo_slot(1, slot));
+    assert_eq!(pdos.parameter(Address::new(0x1A00, 2)), Ok(Small::from(0x6000_0108u32)));
+    assert_eq!(pdos.parameter(Address::new(0x1800, 4)), Err(AbortCode::NO_SUB_INDEX));
+    assert_eq!(pdos.parameter(Address::new(0x1801, 0)), Err(AbortCode::NO_OBJECT));
+    assert_eq!(pdos.parameter(Address::new(0x1C00, 0)), Err(AbortCode::NO_OBJECT));
+    pdos.start();
+    assert_eq!(pdos.data(0, &dictionary).unwrap().bytes(), [0x5A, 0x5A, 0, 0, 0, 0, 0, 0]);
+    pdos.withdraw(0);
+    assert_eq!(pdos.poll_transmit(Duration::ZERO, &dictionary), None, "held back");
+    pdos.trigger(0);
+    assert_eq!(pdos.poll_transmit(Duration::ZERO, &dictionary), Some(Frame::standard(0x181, [0x5A; 2])));
+    slot.communication.cob_id = CobId(0x8000_0181);
+    pdos.set_tpdo_slot(0, slot);
+    assert_eq!((pdos.data(0, &dictionary), pdos.data(1, &dictionary)), (None, None));
+}
+
+/// A PDO is missed in operational only.
+#[test]
+fn no_time_out_after_the_stop() {
+    let mut memory = [0; TABLE.memory()];
+    let Device { objects: Objects { mut dictionary, mut pdos }, .. } = Device::new(&mut memory);
+    let mut slot = pdos.rpdo_slots()[0];
+    slot.communication.event_timer = 10;
+    for stopped in [false, true] {
+        pdos.set_rpdo_slot(0, slot);
+        pdos.start();
+        pdos.handle_frame(Duration::ZERO, &Frame::standard(0x201, [1, 2]));
+        pdos.poll_event(&mut dictionary);
+        if stopped {
+            pdos.stop();
+        }
+        pdos.handle_timeout(Duration::from_millis(10));
+        let event = pdos.poll_event(&mut dictionary);
+        assert_eq!(event, (!stopped).then_some((0, Err(RpdoFault::TimedOut))));
+    }
 }
 
 #[test]

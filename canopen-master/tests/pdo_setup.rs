@@ -21,7 +21,7 @@ const TABLE: Table<'static, 3> = match Table::new([
 };
 
 struct Network<'a> {
-    objects: Objects<'a, (), 0, 1, 4>,
+    objects: Objects<Dictionary<'a, ()>, 0, 1, 4>,
     server: Server,
     client: Client<Small>,
     requests: Vec<Frame>,

@@ -9,7 +9,7 @@ use crate::{Communication, Frame, Handled, Payload, Transmission};
 
 /// A sent PDO.
 ///
-/// - Commands: [`trigger`](Self::trigger).
+/// - Commands: [`trigger`](Self::trigger), [`withdraw`](Self::withdraw).
 /// - Input: [`handle_sync`](Self::handle_sync), [`handle_frame`](Self::handle_frame),
 ///   [`handle_timeout`](Self::handle_timeout).
 /// - Output: [`poll_transmit`](Self::poll_transmit), [`poll_timeout`](Self::poll_timeout).
@@ -57,6 +57,13 @@ impl Tpdo {
     #[inline]
     pub fn trigger(&mut self) {
         self.pending = true;
+    }
+
+    /// What has changed is not worth a PDO: takes back what [`trigger`](Self::trigger), the event timer or
+    /// the beginning of an event-driven PDO asked for.
+    #[inline]
+    pub fn withdraw(&mut self) {
+        self.pending = false;
     }
 
     /// A SYNC has come, with its counter if it has one. `data` is asked where the PDO is due.
@@ -201,6 +208,9 @@ mod tests {
             assert!(sent(&mut tpdo, 110));
             tpdo.handle_sync(None, data);
             assert!(!sent(&mut tpdo, 200), "not by SYNC");
+            tpdo.trigger();
+            tpdo.withdraw();
+            assert!(!sent(&mut tpdo, 200), "held back");
         }
     }
 

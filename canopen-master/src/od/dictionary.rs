@@ -3,8 +3,8 @@
 use pdo::Address;
 
 use super::entry::LENGTH;
-use super::{Entry, Hooks, Initial, Place, Stored, View};
-use crate::data_type::{Kind, Scalar};
+use super::{Entry, Hooks, Initial, Place, ProcessData, Stored, View};
+use crate::data_type::{DataType, Kind, Scalar};
 use crate::sdo::{AbortCode, Access, Piece, Small, Total, read_slice};
 
 /// The memory given for the values is too small.
@@ -156,26 +156,6 @@ impl<'a, H: Hooks> Dictionary<'a, H> {
         own.get(..usize::from(entry.data_type.size()?))
     }
 
-    /// A process value as bits, for a PDO.
-    pub(super) fn bits(&self, at: Address) -> u64 {
-        let value = self.place(at).ok().and_then(|place| self.scalar(place)).unwrap_or_default();
-        value.as_slice().iter().rev().fold(0, |bits, &byte| bits << 8 | u64::from(byte))
-    }
-
-    /// A process value from a PDO, within its limits; what the application vetoes stays as it was.
-    pub(super) fn set_bits(&mut self, at: Address, bits: u64) {
-        let Ok((place, entry)) = self.find(at) else { return };
-        let bytes = bits.to_le_bytes();
-        let value = bytes.get(..usize::from(entry.data_type.size().unwrap_or(0))).unwrap_or(&[]);
-        if matches!(entry.place, Place::Memory { .. })
-            && check_limits(entry, value).is_ok()
-            && self.hooks.check(at, value).is_ok()
-            && put(&self.table, place, self.memory, value)
-        {
-            self.hooks.written(at);
-        }
-    }
-
     fn write_scalar(&mut self, place: usize, entry: &Entry<'_>, piece: &Piece<'_>) -> Result<(), AbortCode> {
         let size = usize::from(entry.data_type.size().unwrap_or(0));
         // Without indicated size an expedited download brings 4 bytes.
@@ -215,6 +195,32 @@ impl<'a, H: Hooks> Dictionary<'a, H> {
             self.hooks.written(entry.at);
         }
         Ok(())
+    }
+}
+
+impl<H: Hooks> ProcessData for Dictionary<'_, H> {
+    fn mapped_type(&self, at: Address, rpdo: bool) -> Result<DataType, AbortCode> {
+        let entry = self.entry(at).ok_or(AbortCode::NO_OBJECT)?;
+        if entry.is_mappable(rpdo) { Ok(entry.data_type) } else { Err(AbortCode::NOT_MAPPABLE) }
+    }
+
+    fn bits(&self, at: Address) -> u64 {
+        let value = self.place(at).ok().and_then(|place| self.scalar(place)).unwrap_or_default();
+        value.as_slice().iter().rev().fold(0, |bits, &byte| bits << 8 | u64::from(byte))
+    }
+
+    /// Within its limits, and unless the application vetoes it.
+    fn set_bits(&mut self, at: Address, bits: u64) {
+        let Ok((place, entry)) = self.find(at) else { return };
+        let bytes = bits.to_le_bytes();
+        let value = bytes.get(..usize::from(entry.data_type.size().unwrap_or(0))).unwrap_or(&[]);
+        if matches!(entry.place, Place::Memory { .. })
+            && check_limits(entry, value).is_ok()
+            && self.hooks.check(at, value).is_ok()
+            && put(&self.table, place, self.memory, value)
+        {
+            self.hooks.written(at);
+        }
     }
 }
 

@@ -9,10 +9,10 @@ use pdo::{
     Transmission, cob,
 };
 
-use super::{Dictionary, Hooks};
+use super::ProcessData;
 use crate::clock::earlier;
 use crate::data_type::DataType;
-use crate::sdo::{AbortCode, Access, Piece, Total, read_slice};
+use crate::sdo::{AbortCode, Small};
 
 /// One PDO: its parameters and its up to `M` mapped objects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -36,7 +36,7 @@ impl<const M: usize> PdoSlot<M> {
     }
 
     /// The value of a parameter and its bytes.
-    fn read(&self, at: Parameter) -> Result<(u32, usize), AbortCode> {
+    pub(super) fn read(&self, at: Parameter) -> Result<(u32, usize), AbortCode> {
         let com = &self.communication;
         Ok(match (at.mapping, at.sub) {
             (false, 0) => (if at.rpdo { 5 } else { 6 }, 1),
@@ -52,7 +52,7 @@ impl<const M: usize> PdoSlot<M> {
     }
 
     /// Changes a parameter that can be read; `value` has as many bytes.
-    fn write(&mut self, at: Parameter, value: u32, objects: &impl Mappable) -> Result<(), AbortCode> {
+    fn write(&mut self, at: Parameter, value: u32, objects: &impl ProcessData) -> Result<(), AbortCode> {
         let valid = self.communication.cob_id.is_valid();
         let com = &mut self.communication;
         match (at.mapping, at.sub) {
@@ -69,6 +69,7 @@ impl<const M: usize> PdoSlot<M> {
             // The inhibit time and the start value must not change while the PDO is valid.
             (false, _) if valid => return Err(AbortCode::INVALID_VALUE),
             (false, 3) => com.inhibit = value as u16,
+            (false, _) if value > 240 => return Err(AbortCode::TOO_HIGH),
             (false, _) => com.sync_start = value as u8,
             (true, _) if valid => return Err(AbortCode::UNSUPPORTED_ACCESS),
             (true, 0) => self.mapping.enable(value as u8).map_err(|error| match error {
@@ -80,7 +81,7 @@ impl<const M: usize> PdoSlot<M> {
                 if !self.mapping.entries().is_empty() {
                     return Err(AbortCode::UNSUPPORTED_ACCESS);
                 }
-                objects.check(entry, at.rpdo)?;
+                check_mapped(entry, at.rpdo, objects)?;
                 self.mapping.set(sub, entry);
             }
         }
@@ -90,7 +91,7 @@ impl<const M: usize> PdoSlot<M> {
 
 /// Where a parameter belongs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Parameter {
+pub(super) struct Parameter {
     rpdo: bool,
     mapping: bool,
     pdo: usize,
@@ -98,7 +99,7 @@ struct Parameter {
 }
 
 impl Parameter {
-    const fn of(at: Address) -> Option<Self> {
+    pub(super) const fn of(at: Address) -> Option<Self> {
         // 1400h, 1600h, 1800h and 1A00h.
         let (rpdo, mapping) = (at.index < 0x1800, at.index & 0x200 != 0);
         match at.index {
@@ -116,32 +117,27 @@ fn checked_cob_id(old: CobId, new: CobId) -> Result<CobId, AbortCode> {
     if refused { Err(AbortCode::INVALID_VALUE) } else { Ok(new) }
 }
 
-/// Which objects may be mapped.
-trait Mappable {
-    fn check(&self, entry: Mapped, rpdo: bool) -> Result<(), AbortCode>;
-}
-
-impl<H: Hooks> Mappable for Dictionary<'_, H> {
-    fn check(&self, entry: Mapped, rpdo: bool) -> Result<(), AbortCode> {
-        let (data_type, mappable) = if entry.is_dummy() {
-            (DataType(entry.at.index), rpdo && entry.at.sub == 0)
-        } else {
-            let object = self.entry(entry.at).ok_or(AbortCode::NO_OBJECT)?;
-            (object.data_type, object.is_mappable(rpdo))
-        };
-        let fits = match entry.bits {
-            1 => data_type == DataType::BOOLEAN,
-            bits => data_type.size().is_some_and(|bytes| bytes * 8 == bits),
-        };
-        if mappable && fits { Ok(()) } else { Err(AbortCode::NOT_MAPPABLE) }
-    }
+/// Whether a PDO may carry what an entry says.
+fn check_mapped(entry: Mapped, rpdo: bool, objects: &impl ProcessData) -> Result<(), AbortCode> {
+    let data_type = match entry.is_dummy() {
+        true if rpdo && entry.at.sub == 0 => DataType(entry.at.index),
+        true => return Err(AbortCode::NOT_MAPPABLE),
+        false => objects.mapped_type(entry.at, rpdo)?,
+    };
+    let fits = match entry.bits {
+        1 => data_type == DataType::BOOLEAN,
+        bits => data_type.size().is_some_and(|bytes| bytes * 8 == bits),
+    };
+    if fits { Ok(()) } else { Err(AbortCode::NOT_MAPPABLE) }
 }
 
 /// `R` RPDOs and `T` TPDOs of up to `M` mapped objects each.
 ///
 /// - Input: [`handle_frame`](Self::handle_frame), [`handle_sync`](Self::handle_sync),
 ///   [`handle_timeout`](Self::handle_timeout).
-/// - Commands: [`start`](Self::start), [`stop`](Self::stop), [`trigger`](Self::trigger).
+/// - Commands: [`start`](Self::start), [`stop`](Self::stop), [`trigger`](Self::trigger),
+///   [`withdraw`](Self::withdraw), [`set_rpdo_slot`](Self::set_rpdo_slot),
+///   [`set_tpdo_slot`](Self::set_tpdo_slot).
 /// - Output: [`poll_transmit`](Self::poll_transmit), [`poll_event`](Self::poll_event),
 ///   [`poll_timeout`](Self::poll_timeout).
 ///
@@ -188,10 +184,49 @@ impl<const R: usize, const T: usize, const M: usize> Pdos<R, T, M> {
         self.running = false;
     }
 
+    /// Changes an RPDO as the device itself may, whatever state it is in; it begins anew. `number` from 0;
+    /// `false` where there is none.
+    pub fn set_rpdo_slot(&mut self, number: usize, slot: PdoSlot<M>) -> bool {
+        let place = self.rpdo_slots.get_mut(number).map(|place| *place = slot);
+        self.restart(true, number);
+        place.is_some()
+    }
+
+    /// Changes a TPDO, as [`set_rpdo_slot`](Self::set_rpdo_slot).
+    pub fn set_tpdo_slot(&mut self, number: usize, slot: PdoSlot<M>) -> bool {
+        let place = self.tpdo_slots.get_mut(number).map(|place| *place = slot);
+        self.restart(false, number);
+        place.is_some()
+    }
+
+    /// The value of a parameter (1400h…1BFFh), little-endian.
+    ///
+    /// # Errors
+    /// The abort code that a client would get: no such PDO or parameter.
+    pub fn parameter(&self, at: Address) -> Result<Small, AbortCode> {
+        let (value, size) = self.read(Parameter::of(at).ok_or(AbortCode::NO_OBJECT)?)?;
+        value.to_le_bytes().get(..size).and_then(Small::new).ok_or(AbortCode::GENERAL)
+    }
+
+    /// What TPDO `number` (from 0) carries if it is sent now; `None` while it does not exist.
+    #[must_use]
+    pub fn data(&self, number: usize, objects: &impl ProcessData) -> Option<Payload> {
+        let slot = self.tpdo_slots.get(number).filter(|slot| slot.effective().cob_id.is_valid())?;
+        Some(pack(slot, objects))
+    }
+
     /// Sends TPDO `number` (from 0) soon: its data have changed.
     pub fn trigger(&mut self, number: usize) {
         if let Some(tpdo) = self.tpdos.get_mut(number) {
             tpdo.trigger();
+        }
+    }
+
+    /// What [`trigger`](Self::trigger), the event timer or the start of an event-driven TPDO asked for is
+    /// not sent after all: the device profile holds the event back.
+    pub fn withdraw(&mut self, number: usize) {
+        if let Some(tpdo) = self.tpdos.get_mut(number) {
+            tpdo.withdraw();
         }
     }
 
@@ -206,18 +241,21 @@ impl<const R: usize, const T: usize, const M: usize> Pdos<R, T, M> {
     }
 
     /// A SYNC has come, with its counter if it has one.
-    pub fn handle_sync<H: Hooks>(&mut self, counter: Option<u8>, dictionary: &Dictionary<'_, H>) {
+    pub fn handle_sync(&mut self, counter: Option<u8>, objects: &impl ProcessData) {
         if !self.running {
             return;
         }
         self.rpdos.iter_mut().for_each(Rpdo::handle_sync);
         for (tpdo, slot) in self.tpdos.iter_mut().zip(&self.tpdo_slots) {
-            tpdo.handle_sync(counter, || pack(slot, dictionary));
+            tpdo.handle_sync(counter, || pack(slot, objects));
         }
     }
 
     /// Notices what is missing and what is due; early calls do nothing.
     pub fn handle_timeout(&mut self, now: Duration) {
+        if !self.running {
+            return;
+        }
         self.rpdos.iter_mut().for_each(|rpdo| rpdo.handle_timeout(now));
         self.tpdos.iter_mut().for_each(|tpdo| tpdo.handle_timeout(now));
     }
@@ -234,24 +272,17 @@ impl<const R: usize, const T: usize, const M: usize> Pdos<R, T, M> {
     }
 
     /// The frame to send now, once.
-    pub fn poll_transmit<H: Hooks>(
-        &mut self,
-        now: Duration,
-        dictionary: &Dictionary<'_, H>,
-    ) -> Option<Frame> {
+    pub fn poll_transmit(&mut self, now: Duration, objects: &impl ProcessData) -> Option<Frame> {
         if !self.running {
             return None;
         }
         let mut tpdos = self.tpdos.iter_mut().zip(&self.tpdo_slots);
-        tpdos.find_map(|(tpdo, slot)| tpdo.poll_transmit(now, || pack(slot, dictionary)))
+        tpdos.find_map(|(tpdo, slot)| tpdo.poll_transmit(now, || pack(slot, objects)))
     }
 
     /// Writes what has come to the dictionary; tells the number (from 0) of the RPDO whose data are there
     /// now, or what was wrong, until `None`.
-    pub fn poll_event<H: Hooks>(
-        &mut self,
-        dictionary: &mut Dictionary<'_, H>,
-    ) -> Option<(usize, Result<(), RpdoFault>)> {
+    pub fn poll_event(&mut self, objects: &mut impl ProcessData) -> Option<(usize, Result<(), RpdoFault>)> {
         let mut rpdos = self.rpdos.iter_mut().zip(&self.rpdo_slots).enumerate();
         let (number, slot, event) =
             rpdos.find_map(|(number, (rpdo, slot))| Some((number, slot, rpdo.poll_event()?)))?;
@@ -260,7 +291,7 @@ impl<const R: usize, const T: usize, const M: usize> Pdos<R, T, M> {
                 let values = slot.mapping.unpack(payload).into_iter().flatten();
                 values
                     .filter(|(entry, _)| !entry.is_dummy())
-                    .for_each(|(entry, bits)| dictionary.set_bits(entry.at, bits.unsigned()));
+                    .for_each(|(entry, bits)| objects.set_bits(entry.at, bits.unsigned()));
                 Some((number, Ok(())))
             }
             RpdoEvent::Fault(fault) => Some((number, Err(fault))),
@@ -278,12 +309,17 @@ impl<const R: usize, const T: usize, const M: usize> Pdos<R, T, M> {
         }
     }
 
-    fn read(&self, at: Parameter) -> Result<(u32, usize), AbortCode> {
+    pub(super) fn read(&self, at: Parameter) -> Result<(u32, usize), AbortCode> {
         let slots: &[PdoSlot<M>] = if at.rpdo { &self.rpdo_slots } else { &self.tpdo_slots };
         slots.get(at.pdo).ok_or(AbortCode::NO_OBJECT)?.read(at)
     }
 
-    fn write(&mut self, at: Parameter, value: u32, objects: &impl Mappable) -> Result<(), AbortCode> {
+    pub(super) fn write(
+        &mut self,
+        at: Parameter,
+        value: u32,
+        objects: &impl ProcessData,
+    ) -> Result<(), AbortCode> {
         let slots: &mut [PdoSlot<M>] = if at.rpdo { &mut self.rpdo_slots } else { &mut self.tpdo_slots };
         slots.get_mut(at.pdo).ok_or(AbortCode::NO_OBJECT)?.write(at, value, objects)?;
         self.restart(at.rpdo, at.pdo);
@@ -291,55 +327,6 @@ impl<const R: usize, const T: usize, const M: usize> Pdos<R, T, M> {
     }
 }
 
-fn pack<const M: usize, H: Hooks>(slot: &PdoSlot<M>, dictionary: &Dictionary<'_, H>) -> Payload {
-    slot.mapping.pack(|entry| dictionary.bits(entry.at))
-}
-
-/// Dictionary and PDO parameters as a server serves them; [`Slave`](crate::slave::Slave) moves the
-/// process data between both.
-#[derive(Debug)]
-pub struct Objects<'a, H, const R: usize, const T: usize, const M: usize> {
-    /// Everything but 1400h…1BFFh.
-    pub dictionary: Dictionary<'a, H>,
-    /// 1400h…1BFFh.
-    pub pdos: Pdos<R, T, M>,
-}
-
-impl<H: Hooks, const R: usize, const T: usize, const M: usize> Access for Objects<'_, H, R, T, M> {
-    #[inline]
-    fn read(&mut self, at: Address, offset: u32, out: &mut [u8]) -> Result<(usize, Total), AbortCode> {
-        match Parameter::of(at) {
-            None => self.dictionary.read(at, offset, out),
-            Some(parameter) => {
-                let (value, size) = self.pdos.read(parameter)?;
-                Ok(read_slice(value.to_le_bytes().get(..size).unwrap_or(&[]), offset, out))
-            }
-        }
-    }
-
-    fn begin_write(&mut self, at: Address, size: Option<u32>) -> Result<(), AbortCode> {
-        match Parameter::of(at) {
-            None => self.dictionary.begin_write(at, size),
-            Some(parameter) => self.pdos.read(parameter).map(|_| ()),
-        }
-    }
-
-    fn write(&mut self, at: Address, piece: &Piece<'_>) -> Result<(), AbortCode> {
-        let Some(parameter) = Parameter::of(at) else { return self.dictionary.write(at, piece) };
-        let (_, size) = self.pdos.read(parameter)?;
-        // Without indicated size an expedited download brings 4 bytes.
-        let found = if piece.size.is_none() { piece.data.len().min(size) } else { piece.data.len() };
-        if !piece.is_whole() || found > size {
-            return Err(AbortCode::TOO_LONG);
-        }
-        if found < size {
-            return Err(AbortCode::TOO_SHORT);
-        }
-        let value = piece.data.iter().take(size).rev().fold(0, |value, &byte| value << 8 | u32::from(byte));
-        self.pdos.write(parameter, value, &self.dictionary)
-    }
-
-    fn abandon(&mut self, at: Address) {
-        self.dictionary.abandon(at);
-    }
+fn pack<const M: usize>(slot: &PdoSlot<M>, objects: &impl ProcessData) -> Payload {
+    slot.mapping.pack(|entry| objects.bits(entry.at))
 }

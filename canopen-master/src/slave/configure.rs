@@ -6,6 +6,7 @@ use pdo::{CobId, NodeId, cob};
 
 use super::objects::{View, number};
 use super::{CONSUMERS, Event, Objects, Slave};
+use crate::emcy::ErrorCode;
 use crate::heartbeat::{Consumer, Producer};
 use crate::nmt::State;
 use crate::ring::Ring;
@@ -27,8 +28,8 @@ impl<D: Objects> Slave<D> {
         self.boot_up = true;
         self.running = true;
         self.answers = Ring::new();
-        let (server, mut view) = self.serving();
-        server.reset(Channel::default_of(node), &mut view);
+        self.reset_server(Channel::default_of(node));
+        self.errors.forget(ErrorCode::LIFE_GUARD);
         self.guard = guarding::Slave::new(node, None);
         self.producer = Producer::new(node, 0, now);
         self.consumers = [None; CONSUMERS];
@@ -45,7 +46,16 @@ impl<D: Objects> Slave<D> {
         } else {
             self.objects.stop();
         }
+        if !state.has_sdo() {
+            self.reset_server(self.server.channel());
+        }
         self.tell(Event::State(state));
+    }
+
+    /// Transfers end, unfinished.
+    pub(super) fn reset_server(&mut self, channel: Channel) {
+        let (server, mut view) = self.serving();
+        server.reset(channel, &mut view);
     }
 
     /// Takes over what a communication object says.

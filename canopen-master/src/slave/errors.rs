@@ -49,6 +49,13 @@ impl Errors {
         self.producer.push(Emergency { code, register, data })
     }
 
+    /// An error is gone, and nobody is told: the communication that it belongs to starts anew.
+    pub(super) fn forget(&mut self, code: ErrorCode) {
+        if let Some(slot) = self.slot(code) {
+            *slot = ErrorCode::NO_ERROR;
+        }
+    }
+
     /// An error that is over as soon as it is told, such as a PDO that was too short.
     pub(super) fn mention(&mut self, code: ErrorCode, data: [u8; 5]) {
         let register = self.register() | code.register_bit();

@@ -4,10 +4,11 @@
 //! The dictionary is anything that implements [`Objects`]. What it holds in the
 //! communication area takes effect when the slave boots and when it is written: 1005h, 1006h, 1019h
 //! (SYNC), 100Ch, 100Dh (guarding), 1014h, 1015h (EMCY), 1016h, 1017h (heartbeat), 1029h (error
-//! behaviour). Objects that are not there have their defaults. 1001h and 1003h are the slave's own.
+//! behaviour). Objects that are not there have their defaults. 1001h and 1003h are the slave's own: a reset
+//! empties the error history, as the power-on values of the communication area do (CiA 301, 7.3.2.2.1), but
+//! errors of the device that are still there go on in the error register.
 
 mod configure;
-mod device;
 mod errors;
 mod objects;
 mod process;
@@ -28,9 +29,13 @@ use crate::sdo::{Channel, Server};
 use crate::time::TimeOfDay;
 use crate::{guarding, sync};
 
-pub use device::Device;
 pub use errors::EMERGENCIES;
 pub use process::Objects;
+
+/// Objects of a slave with an [`od::Dictionary`](crate::od::Dictionary) and `R` RPDOs and `T` TPDOs of up
+/// to `M` mapped objects each.
+pub type Device<'a, H, const R: usize, const T: usize, const M: usize> =
+    crate::od::Objects<crate::od::Dictionary<'a, H>, R, T, M>;
 
 use errors::Errors;
 
@@ -100,7 +105,7 @@ pub enum Event {
 /// A CANopen slave around a dictionary `D`.
 ///
 /// - Commands: [`boot`](Self::boot), [`raise`](Self::raise), [`clear`](Self::clear),
-///   [`stored`](Self::stored).
+///   [`mention`](Self::mention), [`stored`](Self::stored).
 /// - Input: [`handle_frame`](Self::handle_frame), [`handle_timeout`](Self::handle_timeout),
 ///   and from the adapter [`handle_bus`](Self::handle_bus).
 /// - Output: [`poll_transmit`](Self::poll_transmit), [`poll_event`](Self::poll_event),
@@ -162,6 +167,12 @@ impl<D: Objects> Slave<D> {
         self.lss.node()
     }
 
+    /// The address that it will have from the next [`boot`](Self::boot) on: LSS may have given another.
+    #[must_use]
+    pub const fn next_node(&self) -> Option<NodeId> {
+        self.lss.pending()
+    }
+
     /// Its NMT state; [`State::BootUp`] while it is silent.
     #[must_use]
     pub const fn state(&self) -> State {
@@ -193,6 +204,12 @@ impl<D: Objects> Slave<D> {
     /// [`emcy::ProducerFull`]: too many emergencies wait; the history has it all the same.
     pub fn raise(&mut self, code: ErrorCode, data: [u8; 5]) -> Result<(), emcy::ProducerFull> {
         self.errors.raise(code, data)
+    }
+
+    /// Something was wrong and is over: sends an emergency and enters it into the history (1003h), nothing
+    /// more. Where too many emergencies wait, only the history has it.
+    pub fn mention(&mut self, code: ErrorCode, data: [u8; 5]) {
+        self.errors.mention(code, data);
     }
 
     /// An error is gone: sends the emergency 0000h, with the register of those that are left.

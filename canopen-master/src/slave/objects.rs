@@ -24,6 +24,7 @@ impl<D: Access> Access for View<'_, D> {
         let history = self.errors.history();
         let (value, size) = match (at.index, at.sub) {
             (ERROR_REGISTER, 0) => (self.errors.register().into(), 1),
+            (ERROR_REGISTER, _) => return Err(AbortCode::NO_SUB_INDEX),
             (ERROR_HISTORY, 0) => (history.len() as u32, 1),
             (ERROR_HISTORY, sub) => (*history.get(usize::from(sub) - 1).ok_or(AbortCode::NO_DATA)?, 4),
             _ => return self.dictionary.read(at, offset, out),

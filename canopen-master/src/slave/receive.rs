@@ -119,6 +119,7 @@ impl<D: Objects> Slave<D> {
                 self.objects.stop();
                 self.boot_up = false;
                 self.answers = Ring::new();
+                self.errors.producer().clear();
                 self.tell(match reset {
                     Change::ResetNode => Event::ResetNode,
                     _ => Event::ResetCommunication,
@@ -129,8 +130,8 @@ impl<D: Objects> Slave<D> {
     }
 
     pub(super) fn on_sync(&mut self, event: sync::Event) {
-        if matches!(event, sync::Event::Length { .. }) {
-            self.errors.mention(ErrorCode::SYNC_LENGTH, [0; 5]);
+        if let sync::Event::Length { expected, found } = event {
+            self.errors.mention(ErrorCode::SYNC_LENGTH, [expected, found, 0, 0, 0]);
         }
         let counter = match event {
             sync::Event::Sync { counter } => Some(counter),

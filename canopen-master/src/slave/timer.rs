@@ -32,9 +32,7 @@ impl<D: Objects> Slave<D> {
         }
         if before.is_on() && !status.is_on() {
             self.answers = Ring::new();
-            let channel = self.server.channel();
-            let (server, mut view) = self.serving();
-            server.reset(channel, &mut view);
+            self.reset_server(self.server.channel());
         } else if status.is_on() && !before.is_on() && self.producer.time_ms() != 0 {
             let time = self.producer.time_ms();
             self.producer.set_time(time, now);

@@ -4,6 +4,7 @@ mod boot;
 mod bus;
 mod length;
 mod net;
+mod slave;
 mod watch;
 
 use canopen_master::lss::{self, Operation, Outcome};
@@ -11,7 +12,7 @@ use canopen_master::master::{Event, SubmitError};
 use canopen_master::nmt::{Command, State, Target};
 use canopen_master::scan::{BusState, HEADING, Options};
 use canopen_master::sdo;
-use canopen_master::slave::{self, Slave};
+use canopen_master::slave::{Config as SlaveConfig, Slave};
 use canopen_master::{Address, NodeId, NodeSet};
 
 use net::{Net, drive, identity, ms, node};
@@ -156,7 +157,7 @@ fn a_scan_finds_who_is_there_in_one_time_out() {
 fn devices_get_their_address_by_lss() {
     let mut net = Net::new(&[]);
     let new = |serial| {
-        let mut slave = Slave::new(&slave::Config::new(identity(serial), None), drive(identity(serial)));
+        let mut slave = Slave::new(&SlaveConfig::new(identity(serial), None), drive(identity(serial)));
         assert!(!slave.boot(ms(0)), "it has no address");
         slave
     };

@@ -209,7 +209,7 @@ pub fn od_ops(data: &[u8]) {
     let mut memory = [0; TABLE.memory()];
     let dictionary = Dictionary::new(TABLE.view(), &mut memory, ()).unwrap();
     let slot = |id| PdoSlot::new(Communication::event_driven(CobId(id)), Mapping::EMPTY);
-    let mut objects: Objects<'_, (), 1, 1, 4> =
+    let mut objects: Objects<Dictionary<'_, ()>, 1, 1, 4> =
         Objects { dictionary, pdos: Pdos::new([slot(0x8000_0201)], [slot(0xC000_0181)]) };
     let indices = [0x1000, 0x1010, 0x2000, 0x6000, 0x6200, 0x1400, 0x1600, 0x1800, 0x1A00];
     let mut now = Duration::ZERO;

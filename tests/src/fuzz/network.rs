@@ -280,7 +280,7 @@ pub fn canopen_slave_ops(data: &[u8]) {
     let mut memory = [0; TABLE.memory()];
     let dictionary = Dictionary::new(TABLE.view(), &mut memory, ()).unwrap();
     let slot = |id| PdoSlot::new(Communication::event_driven(CobId(id)), Mapping::EMPTY);
-    let objects: Objects<'_, (), 1, 1, 4> =
+    let objects: Objects<Dictionary<'_, ()>, 1, 1, 4> =
         Objects { dictionary, pdos: Pdos::new([slot(0x8000_0201)], [slot(0xC000_0181)]) };
     let address = (!input.u8().is_multiple_of(4)).then_some(NodeId::MIN);
     let mut slave = Slave::new(&slave::Config::new(Identity::default(), address), objects);
