@@ -188,10 +188,10 @@ fn a_mapping_is_set_up_in_the_standard_order_and_not_otherwise() {
     bench.put(0x1800, 1, &0x8000_0185u32.to_le_bytes());
     abort(bench.write(0x1A00, 1, &entry(0x6401, 2, 16), &options), AbortCode::UNSUPPORTED_ACCESS);
     bench.put(0x1A00, 0, &[0]);
-    abort(bench.write(0x1A00, 1, &entry(0x6401, 9, 16), &options), AbortCode::NO_SUB_INDEX);
+    abort(bench.write(0x1A00, 1, &entry(0x6401, 9, 16), &options), AbortCode::NO_OBJECT);
     abort(bench.write(0x1A00, 1, &entry(0x7000, 1, 16), &options), AbortCode::NO_OBJECT);
     abort(bench.write(0x1A00, 1, &entry(0x1008, 0, 32), &options), AbortCode::NOT_MAPPABLE);
-    abort(bench.write(0x1A00, 1, &entry(0x6401, 2, 8), &options), AbortCode::PDO_LENGTH);
+    abort(bench.write(0x1A00, 1, &entry(0x6401, 2, 8), &options), AbortCode::NOT_MAPPABLE);
     for sub in 1..=5 {
         bench.put(0x1A00, sub, &entry(0x6401, 2, 16));
     }

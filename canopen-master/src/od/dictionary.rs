@@ -4,7 +4,7 @@ use pdo::Address;
 
 use super::entry::LENGTH;
 use super::{Entry, Hooks, Initial, Place, ProcessData, Stored, View};
-use crate::data_type::{DataType, Kind, Scalar};
+use crate::data_type::{DataType, Scalar};
 use crate::sdo::{AbortCode, Access, Piece, Small, Total, read_slice};
 
 /// The memory given for the values is too small.
@@ -17,9 +17,10 @@ pub struct RamError {
     pub found: usize,
 }
 
-/// What is written to 1010h and 1011h.
-const SAVE: &[u8] = b"save";
-const LOAD: &[u8] = b"load";
+/// What is written to 1010h (CiA 301, 7.5.2.13).
+pub const SAVE: &[u8] = b"save";
+/// What is written to 1011h (CiA 301, 7.5.2.14).
+pub const LOAD: &[u8] = b"load";
 /// What is read there: the device stores on command, and not by itself.
 const ON_COMMAND: u32 = 1;
 
@@ -157,15 +158,7 @@ impl<'a, H: Hooks> Dictionary<'a, H> {
     }
 
     fn write_scalar(&mut self, place: usize, entry: &Entry<'_>, piece: &Piece<'_>) -> Result<(), AbortCode> {
-        let size = usize::from(entry.data_type.size().unwrap_or(0));
-        // Without indicated size an expedited download brings 4 bytes.
-        let value = if piece.size.is_none() { piece.data.get(..size) } else { None }.unwrap_or(piece.data);
-        if !piece.is_whole() || value.len() > size {
-            return Err(AbortCode::TOO_LONG);
-        }
-        if value.len() < size {
-            return Err(AbortCode::TOO_SHORT);
-        }
+        let value = piece.exactly(entry.data_type.size().unwrap_or(0).into())?;
         match entry.place {
             Place::Store if value == SAVE => {
                 let stored = Stored::new(self.table, self.memory, entry.at.sub);
@@ -277,23 +270,7 @@ impl<H: Hooks> Access for Dictionary<'_, H> {
 }
 
 fn check_limits(entry: &Entry<'_>, value: &[u8]) -> Result<(), AbortCode> {
-    let Some(limits) = entry.limits else { return Ok(()) };
-    let bits = value.iter().rev().fold(0u64, |bits, &byte| bits << 8 | u64::from(byte));
-    let number = match entry.data_type.kind() {
-        Kind::Signed(_) => {
-            let unused = 64 - 8 * value.len().clamp(1, 8);
-            (bits << unused) as i64 >> unused
-        }
-        // Beyond what limits can say is too high for any.
-        _ => i64::try_from(bits).map_err(|_| AbortCode::TOO_HIGH)?,
-    };
-    if number > limits.high {
-        return Err(AbortCode::TOO_HIGH);
-    }
-    if number < limits.low {
-        return Err(AbortCode::TOO_LOW);
-    }
-    Ok(())
+    entry.limits.map_or(Ok(()), |limits| limits.check(entry.data_type, value))
 }
 
 /// The memory of an entry.

@@ -3,6 +3,7 @@
 use pdo::Address;
 
 use crate::data_type::{DataType, Kind};
+use crate::sdo::AbortCode;
 
 /// Who may do what with an entry (CiA 301, 7.4.3, "access").
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -33,6 +34,17 @@ impl Rights {
     pub const fn can_write(self) -> bool {
         matches!(self, Self::Wo | Self::Rw | Self::Rwr | Self::Rww)
     }
+
+    /// Whether an RPDO (else a TPDO) may carry an entry that may be mapped: what can be written, or read;
+    /// `Rwr` only goes into a TPDO, `Rww` only into an RPDO.
+    #[must_use]
+    pub const fn can_map(self, rpdo: bool) -> bool {
+        if rpdo {
+            self.can_write() && !matches!(self, Self::Rwr)
+        } else {
+            self.can_read() && !matches!(self, Self::Rww)
+        }
+    }
 }
 
 /// The lowest and highest value of an integer.
@@ -42,6 +54,28 @@ pub struct Limits {
     pub low: i64,
     /// Anything above is refused with 06090031h.
     pub high: i64,
+}
+
+impl Limits {
+    /// Whether an integer of this type, as on the wire, is within them.
+    ///
+    /// # Errors
+    /// [`AbortCode::TOO_HIGH`], [`AbortCode::TOO_LOW`].
+    pub fn check(&self, data_type: DataType, value: &[u8]) -> Result<(), AbortCode> {
+        let bits = value.iter().rev().fold(0u64, |bits, &byte| bits << 8 | u64::from(byte));
+        let number = match data_type.kind() {
+            Kind::Signed(_) => {
+                let unused = 64 - 8 * value.len().clamp(1, 8);
+                (bits << unused) as i64 >> unused
+            }
+            // Beyond what limits can say is too high for any.
+            _ => i64::try_from(bits).map_err(|_| AbortCode::TOO_HIGH)?,
+        };
+        if number > self.high {
+            return Err(AbortCode::TOO_HIGH);
+        }
+        if number < self.low { Err(AbortCode::TOO_LOW) } else { Ok(()) }
+    }
 }
 
 /// The value at power-on.
@@ -82,8 +116,7 @@ pub struct Entry<'a> {
     pub data_type: DataType,
     /// Who may do what.
     pub rights: Rights,
-    /// May be mapped into a PDO: a TPDO if it can be read, an RPDO if it can be written; `Rwr` only into
-    /// a TPDO, `Rww` only into an RPDO.
+    /// May be mapped into the PDOs that [`Rights::can_map`] says.
     pub mappable: bool,
     /// Kept by 1010h.
     pub stored: bool,
@@ -180,12 +213,7 @@ impl<'a> Entry<'a> {
     /// Whether an RPDO (else a TPDO) may carry it.
     #[must_use]
     pub const fn is_mappable(&self, rpdo: bool) -> bool {
-        let direction = if rpdo {
-            self.rights.can_write() && !matches!(self.rights, Rights::Rwr)
-        } else {
-            self.rights.can_read() && !matches!(self.rights, Rights::Rww)
-        };
-        self.mappable && direction
+        self.mappable && self.rights.can_map(rpdo)
     }
 
     /// Bytes of the value in memory; of a type without fixed length its length before it (2 bytes).

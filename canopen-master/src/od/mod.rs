@@ -13,7 +13,7 @@ mod objects;
 mod pdos;
 mod table;
 
-pub use dictionary::{Dictionary, RamError};
+pub use dictionary::{Dictionary, LOAD, RamError, SAVE};
 pub use entry::{Entry, Initial, Limits, Place, Rights};
 pub use hooks::{Hooks, Stored};
 pub use objects::{Objects, ProcessData};

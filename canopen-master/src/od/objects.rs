@@ -56,15 +56,7 @@ impl<D: Access + ProcessData, const R: usize, const T: usize, const M: usize> Ac
     fn write(&mut self, at: Address, piece: &Piece<'_>) -> Result<(), AbortCode> {
         let Some(parameter) = Parameter::of(at) else { return self.dictionary.write(at, piece) };
         let (_, size) = self.pdos.read(parameter)?;
-        // Without indicated size an expedited download brings 4 bytes.
-        let found = if piece.size.is_none() { piece.data.len().min(size) } else { piece.data.len() };
-        if !piece.is_whole() || found > size {
-            return Err(AbortCode::TOO_LONG);
-        }
-        if found < size {
-            return Err(AbortCode::TOO_SHORT);
-        }
-        let value = piece.data.iter().take(size).rev().fold(0, |value, &byte| value << 8 | u32::from(byte));
+        let value = piece.exactly(size)?.iter().rev().fold(0, |value, &byte| value << 8 | u32::from(byte));
         self.pdos.write(parameter, value, &self.dictionary)
     }
 

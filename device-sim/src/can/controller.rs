@@ -2,11 +2,10 @@
 
 use core::time::Duration;
 
-use canopen_master::master::BusStatus;
 use motion_core::bus::CanBus;
 use pdo::Frame;
 
-use super::{Event, Node, State};
+use super::{Event, Node};
 
 impl Node for CanBus {
     fn handle_frame(&mut self, now: Duration, frame: &Frame) {
@@ -27,13 +26,7 @@ impl Node for CanBus {
 
     fn handle_bus(&mut self, now: Duration, event: Event) {
         if let Event::State(state) = event {
-            let status = match state {
-                State::Active => BusStatus::Active,
-                State::Warning => BusStatus::Warning,
-                State::Passive => BusStatus::Passive,
-                State::BusOff => BusStatus::Off,
-            };
-            Self::handle_bus(self, now, status);
+            Self::handle_bus(self, now, state.into());
         }
     }
 }

@@ -2,6 +2,8 @@
 
 use core::fmt;
 
+use canopen_master::BusStatus;
+
 /// What a station may do on the bus.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum State {
@@ -23,6 +25,17 @@ impl fmt::Display for State {
             Self::Passive => "error passive",
             Self::BusOff => "bus-off",
         })
+    }
+}
+
+impl From<State> for BusStatus {
+    fn from(state: State) -> Self {
+        match state {
+            State::Active => Self::Active,
+            State::Warning => Self::Warning,
+            State::Passive => Self::Passive,
+            State::BusOff => Self::Off,
+        }
     }
 }
 

@@ -3,14 +3,18 @@
 use canopen_master::data_type::DataType;
 use canopen_master::eds::{Access, Device, Entry, Fields, Object, ObjectType, PdoMapping};
 
-use super::objects;
-use super::{Device as Behaviour, Node};
+use canopen_master::slave::EMERGENCIES;
+use pdo::Address;
+
+use super::common::{MAPPED, PDOS, unsigned8, unsigned32};
+use super::objects::{self, Objects};
+use super::{Device as Behaviour, Node, Rights};
 
 /// What a master needs to know of the node. To be asked of a node before it starts: then its values are
 /// those of a device that was never configured.
 #[must_use]
 pub fn device_file<D: Behaviour>(node: &Node<D>, name: &str) -> Device {
-    let all = node.objects();
+    let all = everything(node);
     let pdos = |from: u16| {
         all.iter().filter(|(at, _)| at.sub == 0 && (from..from + 512).contains(&at.index)).count().to_string()
     };
@@ -80,22 +84,51 @@ pub fn device_file<D: Behaviour>(node: &Node<D>, name: &str) -> Device {
     device
 }
 
+/// The node's objects, the engine's own among them.
+fn everything<D: Behaviour>(node: &Node<D>) -> Objects {
+    let mut all = node.objects().clone();
+    all.insert(0x1001, 0, unsigned8(Rights::Ro, 0).mappable());
+    all.insert(0x1003, 0, unsigned8(Rights::Rw, 0));
+    for sub in 1..=EMERGENCIES as u8 {
+        all.insert(0x1003, sub, unsigned32(Rights::Ro, 0));
+    }
+    for index in [0x1400, 0x1600, 0x1800, 0x1A00].into_iter().flat_map(|base| base..base + PDOS as u16) {
+        for sub in 0..=MAPPED as u8 {
+            let Ok(value) = node.pdos().parameter(Address::new(index, sub)) else { continue };
+            let count = sub == 0 && index & 0x200 == 0;
+            let data_type = match value.as_slice().len() {
+                1 => DataType::UNSIGNED8,
+                2 => DataType::UNSIGNED16,
+                _ => DataType::UNSIGNED32,
+            };
+            let mut entry = objects::Entry::number(data_type, if count { Rights::Ro } else { Rights::Rw }, 0);
+            entry.value = value.as_slice().to_vec();
+            if let (0x1800..0x1A00, 6) = (index, sub) {
+                entry = entry.within(0, 240);
+            }
+            all.insert(index, sub, entry);
+        }
+    }
+    all
+}
+
 fn describe(index: u16, sub: u8, object: &objects::Entry) -> Entry {
-    let rights = object.rights;
     let mut entry = Entry::new(sub);
     entry.name = format!("{index:04X}h:{sub:02X}");
     entry.object_type =
         if object.data_type == DataType::DOMAIN { ObjectType::DOMAIN } else { ObjectType::VAR };
     entry.data_type = Some(object.data_type);
-    entry.access = Some(match (rights.read, rights.write) {
-        (true, true) => Access::ReadWrite,
-        (false, true) => Access::WriteOnly,
-        _ => Access::ReadOnly,
+    entry.access = Some(match object.rights {
+        Rights::Ro => Access::ReadOnly,
+        Rights::Wo => Access::WriteOnly,
+        Rights::Rw => Access::ReadWrite,
+        Rights::Rwr => Access::ReadWriteInput,
+        Rights::Rww => Access::ReadWriteOutput,
+        Rights::Const => Access::Const,
     });
-    entry.pdo_mapping =
-        Some(if rights.transmit || rights.receive { PdoMapping::Optional } else { PdoMapping::No });
-    if let Some((low, high)) = object.limits {
-        (entry.low_limit, entry.high_limit) = (Some(low.to_string()), Some(high.to_string()));
+    entry.pdo_mapping = Some(if object.mappable { PdoMapping::Optional } else { PdoMapping::No });
+    if let Some(limits) = object.limits {
+        (entry.low_limit, entry.high_limit) = (Some(limits.low.to_string()), Some(limits.high.to_string()));
     }
     // Identifiers that the node makes of its address when it starts.
     let own = match (index, sub) {

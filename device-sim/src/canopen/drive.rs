@@ -10,15 +10,16 @@ use canopen_master::ds402::{
     CONTROL_WORD, ControlWord, Drive, MODE, MODE_DISPLAY, Mode, Reaction, STATUS_WORD, State as DriveState,
     StatusWord,
 };
-use canopen_master::emcy::{Emergency, ErrorCode};
+use canopen_master::emcy::ErrorCode;
 use canopen_master::lss::Identity;
 use canopen_master::nmt::State;
 use canopen_master::sdo::AbortCode;
-use pdo::{Address, NodeId};
+use pdo::mapping::Entry as Mapped;
+use pdo::{Address, Mapping, NodeId, Transmission};
 
-use super::common::{map, objects, unsigned8, unsigned16, unsigned32};
-use super::objects::{Entry, Objects, Rights};
-use super::{Context, Device, Node, Settings};
+use super::common::{OFF, objects, slot, unsigned8, unsigned16, unsigned32};
+use super::objects::{Entry, Objects};
+use super::{Context, Device, Node, Pdos, Rights, Settings};
 
 /// Manufacturer status: bit 30 = output stage enabled.
 const MANUFACTURER_STATUS: u16 = 0x1002;
@@ -108,7 +109,7 @@ impl Ld2000 {
             blocked: false,
             moves: false,
         };
-        Node::new(Settings { node, identity }, device, dictionary(identity))
+        Node::new(Settings { node, identity }, device, dictionary(identity), pdos())
     }
 
     /// Its state (CiA 402).
@@ -126,11 +127,10 @@ impl Ld2000 {
     /// A fault happens.
     pub fn fail(&mut self, context: &mut Context<'_>, fault: Fault) {
         self.update(context);
-        self.fault = Some(fault);
+        // The first one counts until it is reset.
         if self.drive.fault().is_some() {
-            let code = fault.code();
-            let data = [CATEGORY_RESET, 0, 0, 0, 0];
-            context.emergencies.push(Emergency { code, register: code.register_bit(), data });
+            self.fault = Some(fault);
+            context.raise(fault.code(), [CATEGORY_RESET, 0, 0, 0, 0]);
         }
         self.update(context);
     }
@@ -180,9 +180,11 @@ impl Ld2000 {
             self.blocked = false;
         }
         for reaction in self.drive.handle_control(word).into_iter().flatten() {
-            if reaction == Reaction::State(DriveState::SwitchOnDisabled) && before == DriveState::Fault {
-                self.fault = None;
-                context.emergencies.push(Emergency::default());
+            if reaction == Reaction::State(DriveState::SwitchOnDisabled)
+                && before == DriveState::Fault
+                && let Some(fault) = self.fault.take()
+            {
+                context.clear(fault.code());
             }
         }
     }
@@ -210,71 +212,89 @@ impl Ld2000 {
         self.speed == self.target(objects).0
     }
 
-    /// Maps the PDO `choice` on a channel.
-    fn choose(objects: &mut Objects, choice: u16, channel: u16) {
-        let mapping: Option<&[(u16, u8, u8)]> = predefined(choice, objects.get(choice + channel, 0));
-        let base = if choice == RECEIVE_CHOICE { 0x1600 } else { 0x1A00 };
-        if let Some(mapping) = mapping {
-            map(objects, base, channel, mapping);
-            let cob = if choice == RECEIVE_CHOICE { 0x1400 } else { 0x1800 } + channel;
-            objects.set(cob, 1, objects.get(cob, 1) & !(1 << 31));
+    /// Maps the PDO that 2600h + channel chooses, or 2A00h + channel.
+    fn choose(context: &mut Context<'_>, choice: u16, channel: usize) {
+        let number = context.objects.get(choice + channel as u16, 0);
+        let Some(mapping) = predefined(choice, number).and_then(|mapped| Mapping::new(mapped).ok()) else {
+            return;
+        };
+        let receive = choice == RECEIVE_CHOICE;
+        let slots = if receive { context.pdos.rpdo_slots() } else { context.pdos.tpdo_slots() };
+        let Some(&(mut slot)) = slots.get(channel) else { return };
+        slot.mapping = mapping;
+        slot.communication.cob_id = slot.communication.cob_id.with_valid(true);
+        if receive {
+            context.pdos.set_rpdo_slot(channel, slot);
+        } else {
+            context.pdos.set_tpdo_slot(channel, slot);
         }
     }
 }
 
+const RPDO_1: &[Mapped] = &[Mapped::new(CONTROL_WORD, 0, 16)];
+const RPDO_22: &[Mapped] = &[Mapped::new(CONTROL_WORD, 0, 16), Mapped::new(SET_VALUE, 0, 32)];
+const RPDO_32: &[Mapped] = &[Mapped::new(SET_VALUE, 0, 32)];
+const TPDO_1: &[Mapped] = &[Mapped::new(STATUS_WORD, 0, 16)];
+const TPDO_22: &[Mapped] =
+    &[Mapped::new(STATUS_WORD, 0, 16), Mapped::new(ACTUAL, 1, 24), Mapped::new(ACTUAL, 2, 24)];
+const TPDO_23: &[Mapped] = &[Mapped::new(STATUS_WORD, 0, 16), Mapped::new(MANUFACTURER_STATUS, 0, 32)];
+const TPDO_32: &[Mapped] = &[Mapped::new(ACTUAL, 1, 24), Mapped::new(ACTUAL, 2, 24)];
+const TPDO_33: &[Mapped] = &[Mapped::new(ACTUAL, 3, 32), Mapped::new(ACTUAL, 0x11, 32)];
+
 /// The mapping of a predefined PDO; `None` for the free ones.
-fn predefined(choice: u16, number: i128) -> Option<&'static [(u16, u8, u8)]> {
+fn predefined(choice: u16, number: i128) -> Option<&'static [Mapped]> {
     match (choice, number) {
-        (RECEIVE_CHOICE, 1) => Some(&[(CONTROL_WORD, 0, 16)]),
-        (RECEIVE_CHOICE, 22) => Some(&[(CONTROL_WORD, 0, 16), (SET_VALUE, 0, 32)]),
-        (RECEIVE_CHOICE, 32) => Some(&[(SET_VALUE, 0, 32)]),
-        (TRANSMIT_CHOICE, 1) => Some(&[(STATUS_WORD, 0, 16)]),
-        (TRANSMIT_CHOICE, 22) => Some(&[(STATUS_WORD, 0, 16), (ACTUAL, 1, 24), (ACTUAL, 2, 24)]),
-        (TRANSMIT_CHOICE, 23) => Some(&[(STATUS_WORD, 0, 16), (MANUFACTURER_STATUS, 0, 32)]),
-        (TRANSMIT_CHOICE, 32) => Some(&[(ACTUAL, 1, 24), (ACTUAL, 2, 24)]),
-        (TRANSMIT_CHOICE, 33) => Some(&[(ACTUAL, 3, 32), (ACTUAL, 0x11, 32)]),
+        (RECEIVE_CHOICE, 1) => Some(RPDO_1),
+        (RECEIVE_CHOICE, 22) => Some(RPDO_22),
+        (RECEIVE_CHOICE, 32) => Some(RPDO_32),
+        (TRANSMIT_CHOICE, 1) => Some(TPDO_1),
+        (TRANSMIT_CHOICE, 22) => Some(TPDO_22),
+        (TRANSMIT_CHOICE, 23) => Some(TPDO_23),
+        (TRANSMIT_CHOICE, 32) => Some(TPDO_32),
+        (TRANSMIT_CHOICE, 33) => Some(TPDO_33),
         (_, 0) => Some(&[]),
         _ => None,
     }
 }
 
+/// PDO 1 of each direction: set values act at once, actual values answer SYNC.
+fn pdos() -> Pdos {
+    let mut status = slot(TPDO_1);
+    status.communication.transmission = Transmission::SyncCyclic(1);
+    Pdos::new([slot(RPDO_1), OFF, OFF, OFF], [status, OFF, OFF, OFF])
+}
+
 fn dictionary(identity: Identity) -> Objects {
     // Type 02, profile 402; four characters, so that the name is transferred at once.
     let mut objects = objects(0x0002_0192, "SD03", identity);
-    objects.insert(0x100B, 0, unsigned8(Rights::RO, 0));
-    objects.insert(MANUFACTURER_STATUS, 0, unsigned32(Rights::TRANSMIT, 0));
-    objects.insert(CONTROL_WORD, 0, unsigned16(Rights::RECEIVE, 0));
-    objects.insert(STATUS_WORD, 0, unsigned16(Rights::TRANSMIT, 0));
-    let mode = |rights| Entry::number(DataType::INTEGER8, rights, i128::from(DIGITAL_SPEED));
-    objects.insert(MODE, 0, mode(Rights::RECEIVE));
-    objects.insert(MODE_DISPLAY, 0, mode(Rights::TRANSMIT));
-    objects.insert(SET_VALUE, 0, Entry::number(DataType::INTEGER32, Rights::RECEIVE, 0));
-    objects.insert(TARGET_VELOCITY, 0, Entry::number(DataType::INTEGER32, Rights::RECEIVE, 0));
-    objects.insert(ACTUAL, 0, unsigned8(Rights::RO, 0x11));
-    objects.insert(ACTUAL, 1, Entry::number(DataType::UNSIGNED24, Rights::TRANSMIT, 0));
-    objects.insert(ACTUAL, 2, Entry::number(DataType::INTEGER24, Rights::TRANSMIT, 0));
-    objects.insert(ACTUAL, 3, Entry::number(DataType::INTEGER32, Rights::TRANSMIT, 0));
-    objects.insert(ACTUAL, 0x11, unsigned32(Rights::TRANSMIT, 0));
+    objects.insert(0x100B, 0, unsigned8(Rights::Ro, 0));
+    objects.insert(MANUFACTURER_STATUS, 0, unsigned32(Rights::Ro, 0).mappable());
+    objects.insert(CONTROL_WORD, 0, unsigned16(Rights::Rw, 0).mappable());
+    objects.insert(STATUS_WORD, 0, unsigned16(Rights::Ro, 0).mappable());
+    let mode = |rights| Entry::number(DataType::INTEGER8, rights, i128::from(DIGITAL_SPEED)).mappable();
+    objects.insert(MODE, 0, mode(Rights::Rw));
+    objects.insert(MODE_DISPLAY, 0, mode(Rights::Ro));
+    objects.insert(SET_VALUE, 0, Entry::number(DataType::INTEGER32, Rights::Rw, 0).mappable());
+    objects.insert(TARGET_VELOCITY, 0, Entry::number(DataType::INTEGER32, Rights::Rw, 0).mappable());
+    objects.insert(ACTUAL, 0, unsigned8(Rights::Ro, 0x11));
+    objects.insert(ACTUAL, 1, Entry::number(DataType::UNSIGNED24, Rights::Ro, 0).mappable());
+    objects.insert(ACTUAL, 2, Entry::number(DataType::INTEGER24, Rights::Ro, 0).mappable());
+    objects.insert(ACTUAL, 3, Entry::number(DataType::INTEGER32, Rights::Ro, 0).mappable());
+    objects.insert(ACTUAL, 0x11, unsigned32(Rights::Ro, 0).mappable());
     for channel in 0..4 {
         let choice = if channel == 0 { 1 } else { 0 };
-        objects.insert(RECEIVE_CHOICE + channel, 0, unsigned8(Rights::RW, choice));
-        objects.insert(TRANSMIT_CHOICE + channel, 0, unsigned8(Rights::RW, choice));
+        objects.insert(RECEIVE_CHOICE + channel, 0, unsigned8(Rights::Rw, choice));
+        objects.insert(TRANSMIT_CHOICE + channel, 0, unsigned8(Rights::Rw, choice));
     }
-    map(&mut objects, 0x1600, 0, &[(CONTROL_WORD, 0, 16)]);
-    map(&mut objects, 0x1A00, 0, &[(STATUS_WORD, 0, 16)]);
-    // Set values act at once, actual values answer SYNC.
-    objects.set(0x1400, 1, 0);
-    objects.set(0x1800, 1, 0);
-    objects.set(0x1800, 2, 1);
     // Name, value, lowest, highest, default.
     for (index, value, low, high) in [(OPMODE, 0, 0, 8), (CBAUD, 500, 10, 1000), (PRBASE, 20, 16, 20)] {
-        let long = |value| Entry::number(DataType::INTEGER32, Rights::RO, value);
-        let own = Entry { rights: Rights::RW, ..long(value) }.within(low, high);
+        let long = |value| Entry::number(DataType::INTEGER32, Rights::Ro, value);
+        let own = Entry { rights: Rights::Rw, ..long(value) }.within(low, high);
         // Format 7 is a 32-bit number.
-        let format = Entry::number(DataType::UNSIGNED8, Rights::RO, 7);
-        objects.insert_all(index, [own, long(low), long(high), long(value), format]);
+        let format = Entry::number(DataType::UNSIGNED8, Rights::Ro, 7);
+        objects.insert_all(index, [own, long(low.into()), long(high.into()), long(value), format]);
     }
-    objects.insert_all(0x3500, [unsigned16(Rights::RO, 3)]);
+    objects.insert_all(0x3500, [unsigned16(Rights::Ro, 3)]);
     objects
 }
 
@@ -301,11 +321,8 @@ impl Device for Ld2000 {
                 self.turn(context.now, context.objects);
                 self.control(context, word);
             }
-            RECEIVE_CHOICE..0x2604 => {
-                Self::choose(context.objects, RECEIVE_CHOICE, at.index - RECEIVE_CHOICE);
-            }
-            TRANSMIT_CHOICE..0x2A04 => {
-                Self::choose(context.objects, TRANSMIT_CHOICE, at.index - TRANSMIT_CHOICE);
+            RECEIVE_CHOICE..0x2604 | TRANSMIT_CHOICE..0x2A04 => {
+                Self::choose(context, at.index & 0xFF00, usize::from(at.index & 3));
             }
             // A mapping of one's own makes the channel a free one.
             0x1600..0x1604 => context.objects.set(at.index - 0x1600 + RECEIVE_CHOICE, 0, 37),
@@ -353,9 +370,7 @@ impl Device for Ld2000 {
         // Warning n04: only an enabled output stage reacts.
         if lost && self.is_enabled() {
             self.blocked = true;
-            let code = ErrorCode::LIFE_GUARD;
-            let data = [CATEGORY_WARNING, 4, 0, 0, 0];
-            context.emergencies.push(Emergency { code, register: code.register_bit(), data });
+            context.mention(ErrorCode::LIFE_GUARD, [CATEGORY_WARNING, 4, 0, 0, 0]);
         }
         self.update(context);
     }

@@ -1,13 +1,15 @@
 //! A node with the objects of a device file (EDS, DCF, XDD).
 
 use canopen_master::data_type::DataType;
-use canopen_master::eds::{self, Access, ObjectType};
+use canopen_master::eds::{self, Access};
 use canopen_master::lss::Identity;
-use pdo::{Address, NodeId};
+use canopen_master::od::Limits;
+use pdo::mapping::Entry as Mapped;
+use pdo::{Address, CobId, NodeId, Transmission};
 
-use super::common::{MAPPED, PDOS, objects};
-use super::objects::{Entry, Objects, Rights};
-use super::{Context, Device, Node, Settings};
+use super::common::{MAPPED, OFF, Slot, objects};
+use super::objects::{Entry, Objects};
+use super::{Context, Device, Node, Pdos, Rights, Settings};
 
 /// Longest value of a text or a domain.
 const LONGEST: usize = super::STORE;
@@ -55,8 +57,46 @@ impl FileNode {
                 add(&mut objects, object.index, 0, &device, &object.own, id);
             }
         }
-        Ok(Node::new(Settings { node, identity }, Self, objects))
+        let rpdos = core::array::from_fn(|number| slot(&device, 0x1400, 0x200, number as u16, id));
+        let tpdos = core::array::from_fn(|number| slot(&device, 0x1800, 0x180, number as u16, id));
+        Ok(Node::new(Settings { node, identity }, Self, objects, Pdos::new(rpdos, tpdos)))
     }
+}
+
+/// A value that the file gives, the configured one before the default.
+fn value(entry: &eds::Entry, node: Option<u8>) -> Option<Vec<u8>> {
+    [entry.value_bytes(node), entry.default_bytes(node)].into_iter().flatten().find_map(Result::ok)
+}
+
+/// PDO `number` (from 0) as the file says, off where it says nothing. `index`: of the communication
+/// parameters of PDO 0; `base`: its identifier in the predefined connection set.
+fn slot(device: &eds::Device, index: u16, base: u32, number: u16, node: Option<u8>) -> Slot {
+    const MAPPING: u16 = 0x200;
+    let read = |entry: &eds::Entry, node| {
+        Some(value(entry, node)?.iter().take(4).rev().fold(0, |value, &byte| value << 8 | u32::from(byte)))
+    };
+    let number_at = |index, sub| read(device.entry(index + number, sub)?, node);
+    let mut slot = OFF;
+    let own = &mut slot.communication;
+    if let Some(entry) = device.entry(index + number, 1) {
+        // Without an address yet, what depends on it can only be the predefined one.
+        let raw = read(entry, node).or_else(|| Some(read(entry, Some(1))? & 0xE000_0000)).unwrap_or(0);
+        let predefined = base + 0x100 * u32::from(number) + node.map_or(0, u32::from);
+        own.cob_id = CobId(if raw & 0x1FFF_FFFF == predefined { raw & 0xE000_0000 } else { raw });
+    }
+    let transmission = number_at(index, 2).and_then(|raw| Transmission::new(raw as u8).ok());
+    own.transmission = transmission.unwrap_or(own.transmission);
+    own.inhibit = number_at(index, 3).map_or(0, |time| time as u16);
+    own.event_timer = number_at(index, 5).map_or(0, |time| time as u16);
+    own.sync_start = number_at(index, 6).map_or(0, |counter| counter as u8);
+    for sub in 1..=MAPPED as u8 {
+        if let Some(raw) = number_at(index + MAPPING, sub) {
+            slot.mapping.set(sub, Mapped::from_raw(raw));
+        }
+    }
+    // A count that does not fit maps nothing.
+    let _ = slot.mapping.enable(number_at(index + MAPPING, 0).map_or(0, |count| count as u8));
+    slot
 }
 
 fn add(
@@ -67,50 +107,44 @@ fn add(
     entry: &eds::Entry,
     node: Option<u8>,
 ) {
-    // Sub-indices that the node itself lives by keep their rights: identity, PDOs, the store.
-    let own = matches!(index, 0x1003 | 0x1010 | 0x1011 | 0x1018 | 0x2000);
-    let beyond = matches!(index & 0xFC00, 0x1400 | 0x1800) && index & 0x1FF >= PDOS;
-    let mapping = matches!(index & 0xFE00, 0x1600 | 0x1A00);
-    if beyond || (own && objects.entry(Address::new(index, sub)).is_some()) || (mapping && sub > MAPPED) {
+    // The engine's own, and what the node itself lives by: identity, the store.
+    let engine = matches!(index, 0x1001 | 0x1003 | 0x1400..0x1C00);
+    let own = matches!(index, 0x1010 | 0x1011 | 0x1018 | 0x2000);
+    if engine || (own && objects.entry(Address::new(index, sub)).is_some()) {
         return;
     }
     let data_type = entry.data_type.map_or(DataType::DOMAIN, |own| DataType(device.base_type(own).0));
-    let value =
-        [entry.value_bytes(node), entry.default_bytes(node)].into_iter().flatten().find_map(Result::ok);
-    let rights = rights(entry);
+    let value = value(entry, node);
+    let rights = rights(entry.access);
     let mut new = match data_type.size() {
         Some(_) => Entry::number(data_type, rights, 0),
-        None => Entry { data_type, rights, value: Vec::new(), longest: LONGEST, limits: None },
+        None => Entry { data_type, rights, ..Entry::domain(LONGEST) },
     };
     if let Some(value) =
         value.filter(|value| data_type.size().is_none_or(|size| value.len() == usize::from(size)))
     {
         new.value = value;
     }
-    if entry.object_type == ObjectType::DOMAIN && data_type == DataType::DOMAIN {
-        new.longest = LONGEST;
-    }
+    new.mappable = entry.is_mappable();
+    // Beyond 64 bits with sign only the limits of a type are.
     if let (Some(low), Some(high)) = entry.limits(node)
+        && let (Ok(low), Ok(high)) = (i64::try_from(low), i64::try_from(high))
         && low <= high
     {
-        new.limits = Some((low, high));
-    }
-    // PDO objects of the file as they are, writable so that a master can set them up.
-    if mapping || matches!(index & 0xFE00, 0x1400 | 0x1800) {
-        new.rights.write |= sub != 0 || mapping;
-        new.limits = None;
+        new.limits = Some(Limits { low, high });
     }
     objects.insert(index, sub, new);
 }
 
-fn rights(entry: &eds::Entry) -> Rights {
-    let mappable = entry.is_mappable();
-    let (read, write) = match entry.access {
-        Some(Access::WriteOnly) => (false, true),
-        Some(Access::ReadOnly | Access::Const) | None => (true, false),
-        Some(_) => (true, true),
-    };
-    Rights { read, write, transmit: mappable && read, receive: mappable && write }
+fn rights(access: Option<Access>) -> Rights {
+    match access {
+        Some(Access::ReadOnly) | None => Rights::Ro,
+        Some(Access::WriteOnly) => Rights::Wo,
+        Some(Access::ReadWrite) => Rights::Rw,
+        Some(Access::ReadWriteInput) => Rights::Rwr,
+        Some(Access::ReadWriteOutput) => Rights::Rww,
+        Some(Access::Const) => Rights::Const,
+    }
 }
 
 impl Device for FileNode {

@@ -10,11 +10,12 @@ use canopen_master::ds401::{
 };
 use canopen_master::lss::Identity;
 use canopen_master::nmt::State;
+use pdo::mapping::Entry as Mapped;
 use pdo::{Address, NodeId};
 
-use super::common::{map, objects, unsigned8, unsigned32};
-use super::objects::{Entry, Rights};
-use super::{Context, Device, Node, Settings};
+use super::common::{OFF, objects, slot, unsigned8, unsigned32};
+use super::objects::Entry;
+use super::{Context, Device, Node, Pdos, Rights, Settings};
 
 /// Analogue channels in each direction.
 const ANALOGUE: u8 = 4;
@@ -44,26 +45,24 @@ impl RemoteIo {
             analogue_outputs: true,
         };
         let mut objects = objects(functions.device_type(), "Virtual I/O", identity);
-        objects.insert_all(DIGITAL_INPUTS, [unsigned8(Rights::TRANSMIT, 0)]);
-        objects.insert_all(INPUT_POLARITY, [unsigned8(Rights::RW, 0)]);
-        objects.insert_all(DIGITAL_OUTPUTS, [unsigned8(Rights::RECEIVE, 0)]);
-        objects.insert_all(OUTPUT_POLARITY, [unsigned8(Rights::RW, 0)]);
-        objects.insert_all(OUTPUT_ERROR_MODE, [unsigned8(Rights::RW, 0xFF)]);
-        objects.insert_all(OUTPUT_ERROR_VALUE, [unsigned8(Rights::RW, 0)]);
-        let word = |rights| (0..ANALOGUE).map(move |_| Entry::number(DataType::INTEGER16, rights, 0));
-        objects.insert_all(ANALOGUE_INPUTS, word(Rights::TRANSMIT));
-        objects.insert_all(ANALOGUE_OUTPUTS, word(Rights::RECEIVE));
-        objects.insert(ANALOGUE_INTERRUPT_ENABLE, 0, Entry::number(DataType::BOOLEAN, Rights::RW, 0));
-        objects.insert_all(ANALOGUE_DELTA, (0..ANALOGUE).map(|_| unsigned32(Rights::RW, 0)));
-        let analogue = |index| [1, 2, 3, 4].map(|sub| (index, sub, 16));
-        map(&mut objects, 0x1600, 0, &[(DIGITAL_OUTPUTS, 1, 8)]);
-        map(&mut objects, 0x1600, 1, &analogue(ANALOGUE_OUTPUTS));
-        map(&mut objects, 0x1A00, 0, &[(DIGITAL_INPUTS, 1, 8)]);
-        map(&mut objects, 0x1A00, 1, &analogue(ANALOGUE_INPUTS));
-        for index in [0x1400, 0x1401, 0x1800, 0x1801] {
-            objects.set(index, 1, 0);
-        }
-        Node::new(Settings { node, identity }, Self { wired, ..Self::default() }, objects)
+        objects.insert_all(DIGITAL_INPUTS, [unsigned8(Rights::Ro, 0).mappable()]);
+        objects.insert_all(INPUT_POLARITY, [unsigned8(Rights::Rw, 0)]);
+        objects.insert_all(DIGITAL_OUTPUTS, [unsigned8(Rights::Rw, 0).mappable()]);
+        objects.insert_all(OUTPUT_POLARITY, [unsigned8(Rights::Rw, 0)]);
+        objects.insert_all(OUTPUT_ERROR_MODE, [unsigned8(Rights::Rw, 0xFF)]);
+        objects.insert_all(OUTPUT_ERROR_VALUE, [unsigned8(Rights::Rw, 0)]);
+        let word =
+            |rights| (0..ANALOGUE).map(move |_| Entry::number(DataType::INTEGER16, rights, 0).mappable());
+        objects.insert_all(ANALOGUE_INPUTS, word(Rights::Ro));
+        objects.insert_all(ANALOGUE_OUTPUTS, word(Rights::Rw));
+        objects.insert(ANALOGUE_INTERRUPT_ENABLE, 0, Entry::number(DataType::BOOLEAN, Rights::Rw, 0));
+        objects.insert_all(ANALOGUE_DELTA, (0..ANALOGUE).map(|_| unsigned32(Rights::Rw, 0)));
+        let analogue = |index| slot(&[1, 2, 3, 4].map(|sub| Mapped::new(index, sub, 16)));
+        let pdos = Pdos::new(
+            [slot(&[Mapped::new(DIGITAL_OUTPUTS, 1, 8)]), analogue(ANALOGUE_OUTPUTS), OFF, OFF],
+            [slot(&[Mapped::new(DIGITAL_INPUTS, 1, 8)]), analogue(ANALOGUE_INPUTS), OFF, OFF],
+        );
+        Node::new(Settings { node, identity }, Self { wired, ..Self::default() }, objects, pdos)
     }
 
     /// The digital inputs, bit 0 = input 1.
@@ -112,7 +111,7 @@ impl Device for RemoteIo {
         }
     }
 
-    fn holds_back(&mut self, context: &mut Context<'_>, tpdo: u16) -> bool {
+    fn holds_back(&mut self, context: &mut Context<'_>, tpdo: usize) -> bool {
         if tpdo != 1 {
             return false;
         }

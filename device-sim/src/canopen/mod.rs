@@ -1,36 +1,43 @@
-//! Virtual CANopen nodes: [`Node`] is the communication of any device, made of the slave's engines of
-//! `canopen-master`; a [`Device`] is what it does. There are a servo drive ([`Ld2000`]), an I/O node
+//! Virtual CANopen nodes: [`Node`] is any device, its communication the slave of `canopen-master`; a
+//! [`Device`] is what it does. There are a servo drive ([`Ld2000`]), an I/O node
 //! ([`RemoteIo`]) and a node with the objects of any EDS ([`FileNode`]).
 //!
 //! Every node has stores for tests at 2000h:01 (64 KiB) and :02 (1 MiB), and a text longer than four bytes at 100Ah.
 
 mod common;
 mod description;
+mod dictionary;
 mod drive;
 mod file;
 mod io;
 mod node;
 mod objects;
-mod pdo;
 
 use core::time::Duration;
 
-pub use ::pdo::Address;
-use canopen_master::emcy::Emergency;
+use canopen_master::emcy::ErrorCode;
 use canopen_master::nmt::State;
+use canopen_master::od;
 use canopen_master::sdo::AbortCode;
 
+pub use canopen_master::od::{Limits, Rights};
 pub use description::device_file;
 pub use drive::{Fault, Ld2000};
 pub use file::{FileNode, FileNodeError};
 pub use io::RemoteIo;
 pub use node::{Node, Settings};
-pub use objects::{Entry, Objects, Rights};
+pub use objects::{Entry, Objects};
+pub use pdo::Address;
+
+use common::{MAPPED, PDOS};
 
 /// Longest content of 2000h:01, in bytes.
 pub const STORE: usize = 64 * 1024;
 /// Longest content of 2000h:02, for transfers that take long, in bytes.
 pub const LONG_STORE: usize = 1024 * 1024;
+
+/// The PDOs of a node: four of each direction.
+pub type Pdos = od::Pdos<PDOS, PDOS, MAPPED>;
 
 /// What a device does with its objects and with time.
 pub trait Device {
@@ -43,7 +50,7 @@ pub trait Device {
         Ok(())
     }
 
-    /// An object has been written, over SDO or by a PDO.
+    /// An object has been written: over SDO, a PDO parameter too, or by a PDO.
     fn written(&mut self, context: &mut Context<'_>, at: Address);
 
     /// Brings what the objects show up to `context.now`. Called before objects are read or sent, on SYNC
@@ -51,7 +58,7 @@ pub trait Device {
     fn update(&mut self, context: &mut Context<'_>);
 
     /// Whether a change does not yet cause the event-driven TPDO with this number (from 0).
-    fn holds_back(&mut self, _context: &mut Context<'_>, _tpdo: u16) -> bool {
+    fn holds_back(&mut self, _context: &mut Context<'_>, _tpdo: usize) -> bool {
         false
     }
 
@@ -74,8 +81,34 @@ pub struct Context<'a> {
     pub now: Duration,
     /// The node's objects.
     pub objects: &'a mut Objects,
+    /// The node's PDOs.
+    pub pdos: &'a mut Pdos,
     /// The node's NMT state.
     pub state: State,
-    /// Emergencies to send.
-    pub emergencies: &'a mut Vec<Emergency>,
+    errors: &'a mut Vec<Error>,
+}
+
+impl Context<'_> {
+    /// An error has occurred: as [`Slave::raise`](canopen_master::slave::Slave::raise).
+    pub fn raise(&mut self, code: ErrorCode, data: [u8; 5]) {
+        self.errors.push(Error::Raised(code, data));
+    }
+
+    /// An error is gone: as [`Slave::clear`](canopen_master::slave::Slave::clear).
+    pub fn clear(&mut self, code: ErrorCode) {
+        self.errors.push(Error::Gone(code));
+    }
+
+    /// Something was wrong and is over: as [`Slave::mention`](canopen_master::slave::Slave::mention).
+    pub fn mention(&mut self, code: ErrorCode, data: [u8; 5]) {
+        self.errors.push(Error::Mentioned(code, data));
+    }
+}
+
+/// What a device has to tell of an error.
+#[derive(Debug)]
+enum Error {
+    Raised(ErrorCode, [u8; 5]),
+    Gone(ErrorCode),
+    Mentioned(ErrorCode, [u8; 5]),
 }

@@ -2,47 +2,26 @@
 
 use std::collections::BTreeMap;
 
-use canopen_master::data_type::{DataType, Kind};
+use canopen_master::data_type::{DataType, Value};
+use canopen_master::od::{Limits, Rights};
 use canopen_master::sdo::AbortCode;
 use pdo::Address;
-
-/// What may be done with an object.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Rights {
-    /// It can be read.
-    pub read: bool,
-    /// It can be written.
-    pub write: bool,
-    /// It can be mapped into TPDOs.
-    pub transmit: bool,
-    /// It can be mapped into RPDOs.
-    pub receive: bool,
-}
-
-impl Rights {
-    /// Read only.
-    pub const RO: Self = Self { read: true, write: false, transmit: false, receive: false };
-    /// Read and write.
-    pub const RW: Self = Self { read: true, write: true, transmit: false, receive: false };
-    /// Read only, in TPDOs.
-    pub const TRANSMIT: Self = Self { read: true, write: false, transmit: true, receive: false };
-    /// Read and write, in RPDOs.
-    pub const RECEIVE: Self = Self { read: true, write: true, transmit: true, receive: true };
-}
 
 /// One object or sub-object.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Entry {
     /// Its type.
     pub data_type: DataType,
-    /// What may be done with it.
+    /// Who may do what with it.
     pub rights: Rights,
+    /// May be mapped into the PDOs that its rights allow.
+    pub mappable: bool,
     /// Its value as on the wire; of a type with fixed length, that length.
     pub value: Vec<u8>,
     /// Longest value, for types without fixed length.
     pub longest: usize,
-    /// Limits of integers, lowest and highest.
-    pub limits: Option<(i128, i128)>,
+    /// Limits of an integer.
+    pub limits: Option<Limits>,
 }
 
 impl Entry {
@@ -52,6 +31,7 @@ impl Entry {
         let mut entry = Self {
             data_type,
             rights,
+            mappable: false,
             value: vec![0; usize::from(data_type.size().unwrap_or(4))],
             longest: 0,
             limits: None,
@@ -66,7 +46,8 @@ impl Entry {
         let value = text.as_bytes().to_vec();
         Self {
             data_type: DataType::VISIBLE_STRING,
-            rights: Rights::RO,
+            rights: Rights::Const,
+            mappable: false,
             longest: value.len(),
             value,
             limits: None,
@@ -76,20 +57,39 @@ impl Entry {
     /// An empty store that can be written with up to `longest` bytes.
     #[must_use]
     pub const fn domain(longest: usize) -> Self {
-        Self { data_type: DataType::DOMAIN, rights: Rights::RW, value: Vec::new(), longest, limits: None }
+        Self {
+            data_type: DataType::DOMAIN,
+            rights: Rights::Rw,
+            mappable: false,
+            value: Vec::new(),
+            longest,
+            limits: None,
+        }
     }
 
     /// The same with limits.
     #[must_use]
-    pub const fn within(mut self, low: i128, high: i128) -> Self {
-        self.limits = Some((low, high));
+    pub const fn within(mut self, low: i64, high: i64) -> Self {
+        self.limits = Some(Limits { low, high });
+        self
+    }
+
+    /// The same, that may be mapped into PDOs.
+    #[must_use]
+    pub const fn mappable(mut self) -> Self {
+        self.mappable = true;
         self
     }
 
     /// The value as a number, signed as its type is; 0 for what is no number.
     #[must_use]
     pub fn get(&self) -> i128 {
-        number(self.data_type, &self.value)
+        match Value::parse(self.data_type, &self.value) {
+            Ok(Value::Signed(value)) => value.into(),
+            Ok(Value::Unsigned(value)) => value.into(),
+            Ok(Value::Boolean(value)) => value.into(),
+            _ => 0,
+        }
     }
 
     /// Sets the value to a number, cut to its length.
@@ -99,41 +99,20 @@ impl Entry {
         }
     }
 
-    /// Bits in a PDO; `None` if it does not fit into one.
-    #[must_use]
-    pub fn bits(&self) -> Option<u32> {
-        match self.data_type.kind() {
-            Kind::Boolean => Some(1),
-            _ => u32::try_from(self.value.len() * 8).ok().filter(|bits| (1..=64).contains(bits)),
-        }
+    /// The most bytes that it takes.
+    pub(super) fn longest(&self) -> usize {
+        self.data_type.size().map_or(self.longest, usize::from)
     }
 
     /// Whether a value may be written, by length and limits.
     pub(super) fn check(&self, value: &[u8]) -> Result<(), AbortCode> {
-        match self.data_type.size().map(usize::from) {
-            Some(len) if value.len() > len => return Err(AbortCode::TOO_LONG),
-            Some(len) if value.len() < len => return Err(AbortCode::TOO_SHORT),
-            Some(_) => {}
-            None if value.len() > self.longest => return Err(AbortCode::TOO_LONG),
-            None => {}
+        if value.len() > self.longest() {
+            return Err(AbortCode::TOO_LONG);
         }
-        let value = number(self.data_type, value);
-        match self.limits {
-            Some((_, high)) if value > high => Err(AbortCode::TOO_HIGH),
-            Some((low, _)) if value < low => Err(AbortCode::TOO_LOW),
-            _ => Ok(()),
+        if self.data_type.size().is_some_and(|size| value.len() < size.into()) {
+            return Err(AbortCode::TOO_SHORT);
         }
-    }
-}
-
-fn number(data_type: DataType, bytes: &[u8]) -> i128 {
-    let len = bytes.len().min(8);
-    let raw = bytes.iter().take(8).rev().fold(0i128, |value, byte| value << 8 | i128::from(*byte));
-    match data_type.kind() {
-        Kind::Signed(_) if len > 0 && bytes.get(len - 1).is_some_and(|top| top & 0x80 != 0) => {
-            raw - (1 << (8 * len))
-        }
-        _ => raw,
+        self.limits.map_or(Ok(()), |limits| limits.check(self.data_type, value))
     }
 }
 
@@ -154,7 +133,7 @@ impl Objects {
             self.insert(index, sub, entry);
             count = sub;
         }
-        self.insert(index, 0, Entry::number(DataType::UNSIGNED8, Rights::RO, i128::from(count)));
+        self.insert(index, 0, Entry::number(DataType::UNSIGNED8, Rights::Ro, i128::from(count)));
     }
 
     /// An object.
@@ -185,10 +164,14 @@ impl Objects {
         }
     }
 
-    /// The abort code for an object that is not there: its index is not, or only its sub-index.
-    pub(super) fn missing(&self, at: Address) -> AbortCode {
+    /// An object that a client asks for.
+    ///
+    /// # Errors
+    /// Its index is not there, or only its sub-index.
+    pub(super) fn found(&self, at: Address) -> Result<&Entry, AbortCode> {
         let whole = Address::new(at.index, 0)..=Address::new(at.index, u8::MAX);
-        if self.0.range(whole).next().is_some() { AbortCode::NO_SUB_INDEX } else { AbortCode::NO_OBJECT }
+        let others = || self.0.range(whole).next().is_some();
+        self.entry(at).ok_or_else(|| if others() { AbortCode::NO_SUB_INDEX } else { AbortCode::NO_OBJECT })
     }
 }
 
@@ -198,11 +181,8 @@ mod tests {
 
     #[test]
     fn numbers_have_sign_and_limits() {
-        let mut speed = Entry::number(DataType::INTEGER24, Rights::RECEIVE, -2);
-        assert_eq!(
-            (speed.value.as_slice(), speed.get(), speed.bits()),
-            (&[0xFE, 0xFF, 0xFF][..], -2, Some(24))
-        );
+        let mut speed = Entry::number(DataType::INTEGER24, Rights::Rw, -2);
+        assert_eq!((speed.value.as_slice(), speed.get()), (&[0xFE, 0xFF, 0xFF][..], -2));
         speed = speed.within(-5, 5);
         assert_eq!(speed.check(&[5, 0, 0]), Ok(()));
         assert_eq!(speed.check(&[6, 0, 0]), Err(AbortCode::TOO_HIGH));
@@ -214,9 +194,9 @@ mod tests {
     #[test]
     fn what_is_missing() {
         let mut objects = Objects::default();
-        objects.insert_all(0x1018, (1..=4).map(|n| Entry::number(DataType::UNSIGNED32, Rights::RO, n)));
+        objects.insert_all(0x1018, (1..=4).map(|n| Entry::number(DataType::UNSIGNED32, Rights::Ro, n)));
         assert_eq!((objects.get(0x1018, 0), objects.get(0x1018, 4)), (4, 4));
-        assert_eq!(objects.missing(Address::new(0x1018, 5)), AbortCode::NO_SUB_INDEX);
-        assert_eq!(objects.missing(Address::new(0x1019, 0)), AbortCode::NO_OBJECT);
+        assert_eq!(objects.found(Address::new(0x1018, 5)), Err(AbortCode::NO_SUB_INDEX));
+        assert_eq!(objects.found(Address::new(0x1019, 0)), Err(AbortCode::NO_OBJECT));
     }
 }

@@ -69,13 +69,10 @@ impl CanDrive {
     }
 
     fn boot(&mut self, now: Duration) {
-        self.slave.objects_mut().reset_communication();
+        // A node ID that LSS has given holds from now on, and objects depend on it.
+        let node = self.slave.next_node();
+        self.slave.objects_mut().reset_communication(node);
         self.slave.boot(now);
-        // Only now a node ID that LSS has given is valid, and objects depend on it.
-        let node = self.slave.node();
-        if self.slave.objects_mut().set_node(node) {
-            self.slave.boot(now);
-        }
     }
 
     /// What has happened takes effect; a drive that restarts falls silent when its answer has gone.

@@ -70,14 +70,9 @@ impl DriveObjects {
         self.now = now;
     }
 
-    /// Returns whether it is another one than before.
-    pub(super) fn set_node(&mut self, node: Option<NodeId>) -> bool {
-        let node = node.map_or(0, NodeId::raw);
-        core::mem::replace(&mut self.node, node) != node
-    }
-
-    /// Communication objects take their power-on values.
-    pub(super) fn reset_communication(&mut self) {
+    /// Communication objects take their power-on values; those that depend on the address follow it.
+    pub(super) fn reset_communication(&mut self, node: Option<NodeId>) {
+        self.node = node.map_or(0, NodeId::raw);
         let entry = |(index, sub, bytes, value)| (Address::new(index, sub), (bytes, value));
         self.communication = WRITABLE.into_iter().map(entry).collect();
     }
@@ -118,18 +113,12 @@ impl DriveObjects {
         })
     }
 
-    fn set_object(&mut self, at: Address, data: &[u8]) -> Result<(), AbortCode> {
+    fn set_object(&mut self, at: Address, piece: &Piece<'_>) -> Result<(), AbortCode> {
         let Some((bytes, value)) = self.communication.get_mut(&at) else {
             return self.object(at).and(Err(AbortCode::READ_ONLY));
         };
-        match data.len().cmp(&usize::from(*bytes)) {
-            core::cmp::Ordering::Less => Err(AbortCode::TOO_SHORT),
-            core::cmp::Ordering::Greater => Err(AbortCode::TOO_LONG),
-            core::cmp::Ordering::Equal => {
-                *value = little_endian(data);
-                Ok(())
-            }
-        }
+        *value = little_endian(piece.exactly((*bytes).into())?);
+        Ok(())
     }
 
     fn execute(&mut self, at: Address, write: Option<[u8; 4]>) -> Result<[u8; 4], AbortCode> {
@@ -173,12 +162,7 @@ impl Access for DriveObjects {
             self.result = Some(self.execute(at, Some(little_endian(piece.data).to_le_bytes()))?);
             return Ok(());
         }
-        // Without an indicated size those bytes count that the object has.
-        let len = match (piece.size, self.communication.get(&at)) {
-            (None, Some((bytes, _))) => usize::from(*bytes),
-            _ => piece.data.len(),
-        };
-        self.set_object(at, piece.data.get(..len).unwrap_or(piece.data))
+        self.set_object(at, piece)
     }
 }
 

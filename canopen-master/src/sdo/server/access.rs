@@ -19,12 +19,25 @@ pub struct Piece<'a> {
     pub size: Option<u32>,
 }
 
-impl Piece<'_> {
+impl<'a> Piece<'a> {
     /// Whether it is the whole object, which is certain for up to 8 bytes.
     #[must_use]
     #[inline]
     pub const fn is_whole(&self) -> bool {
         self.offset == 0 && self.last
+    }
+
+    /// The value of an object of `size` bytes, 1…8.
+    ///
+    /// # Errors
+    /// [`AbortCode::TOO_LONG`], [`AbortCode::TOO_SHORT`]: another number of bytes came.
+    #[inline]
+    pub fn exactly(&self, size: usize) -> Result<&'a [u8], AbortCode> {
+        let value = if self.size.is_none() { self.data.get(..size) } else { None }.unwrap_or(self.data);
+        if !self.is_whole() || value.len() > size {
+            return Err(AbortCode::TOO_LONG);
+        }
+        if value.len() < size { Err(AbortCode::TOO_SHORT) } else { Ok(value) }
     }
 }
 
