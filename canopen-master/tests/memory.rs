@@ -221,4 +221,7 @@ fn wrong_lengths_of_pdos_are_told() {
     let codes: Vec<_> = told.iter().map(|emergency| emergency.code.0).collect();
     assert_eq!(codes, [0x8220, 0x8210]);
     assert_eq!(told[1].data, [0x00, 0x16, 6, 3, 0]);
+    assert_eq!(slave.error_register(), 0x11);
+    slave.handle_frame(now, &canopen_master::Frame::standard(0x080, []));
+    assert_eq!(slave.error_register(), 0, "the long one is taken");
 }

@@ -4,9 +4,9 @@ use core::time::Duration;
 
 use pdo::{CobId, NodeId, cob};
 
+use super::errors::DEVICE;
 use super::objects::{View, number};
 use super::{CONSUMERS, Event, Objects, Slave};
-use crate::emcy::ErrorCode;
 use crate::heartbeat::{Consumer, Producer};
 use crate::nmt::State;
 use crate::ring::Ring;
@@ -29,7 +29,8 @@ impl<D: Objects> Slave<D> {
         self.running = true;
         self.answers = Ring::new();
         self.reset_server(Channel::default_of(node));
-        self.errors.forget(ErrorCode::LIFE_GUARD);
+        // Nothing is told: the boot-up message says more.
+        let _ = self.errors.clear(|_, cause| cause != DEVICE, false);
         self.guard = guarding::Slave::new(node, None);
         self.producer = Producer::new(node, 0, now);
         self.consumers = [None; CONSUMERS];

@@ -7,24 +7,28 @@ use crate::emcy::{Emergency, ErrorCode, Producer, ProducerFull};
 /// Errors that can be there at once, emergencies that can wait, entries of the history (1003h).
 pub const EMERGENCIES: usize = 8;
 
+/// What an error comes from: an object of the communication area that stands for it, or [`DEVICE`].
+pub(super) type Cause = u16;
+
+/// The device itself, or its CAN controller.
+pub(super) const DEVICE: Cause = 0;
+/// Guarding and heartbeats.
+pub(super) const ERROR_CONTROL: Cause = 0x1029;
+
 #[derive(Debug, Clone)]
 pub(super) struct Errors {
     /// [`ErrorCode::NO_ERROR`] where there is room.
-    active: [ErrorCode; EMERGENCIES],
+    active: [(ErrorCode, Cause); EMERGENCIES],
     producer: Producer<EMERGENCIES>,
 }
 
 impl Errors {
     pub(super) fn new() -> Self {
-        Self { active: [ErrorCode::NO_ERROR; EMERGENCIES], producer: Producer::new(0) }
+        Self { active: [(ErrorCode::NO_ERROR, DEVICE); EMERGENCIES], producer: Producer::new(0) }
     }
 
     pub(super) fn register(&self) -> u8 {
-        self.active.iter().fold(0, |register, code| register | code.register_bit())
-    }
-
-    fn slot(&mut self, code: ErrorCode) -> Option<&mut ErrorCode> {
-        self.active.iter_mut().find(|slot| **slot == code)
+        self.active.iter().fold(0, |register, (code, _)| register | code.register_bit())
     }
 
     pub(super) const fn producer(&mut self) -> &mut Producer<EMERGENCIES> {
@@ -40,34 +44,48 @@ impl Errors {
         self.producer.poll_timeout()
     }
 
-    pub(super) fn raise(&mut self, code: ErrorCode, data: [u8; 5]) -> Result<(), ProducerFull> {
-        if self.active.contains(&code) {
+    pub(super) fn raise(&mut self, code: ErrorCode, cause: Cause, data: [u8; 5]) -> Result<(), ProducerFull> {
+        if self.active.contains(&(code, cause)) {
             return Ok(());
         }
-        *self.slot(ErrorCode::NO_ERROR).ok_or(ProducerFull(EMERGENCIES))? = code;
+        let mut slots = self.active.iter_mut();
+        let room = slots.find(|(code, _)| *code == ErrorCode::NO_ERROR).ok_or(ProducerFull(EMERGENCIES))?;
+        *room = (code, cause);
         let register = self.register();
         self.producer.push(Emergency { code, register, data })
     }
 
-    /// An error is gone, and nobody is told: the communication that it belongs to starts anew.
-    pub(super) fn forget(&mut self, code: ErrorCode) {
-        if let Some(slot) = self.slot(code) {
-            *slot = ErrorCode::NO_ERROR;
-        }
-    }
-
-    /// An error that is over as soon as it is told, such as a PDO that was too short.
+    /// An error that is over as soon as it is told, such as a PDO that was too long.
     pub(super) fn mention(&mut self, code: ErrorCode, data: [u8; 5]) {
         let register = self.register() | code.register_bit();
         // The history has it, even where too many wait.
         let _ = self.producer.push(Emergency { code, register, data });
     }
 
-    pub(super) fn clear(&mut self, code: ErrorCode) -> Result<(), ProducerFull> {
-        let Some(slot) = self.slot(code) else { return Ok(()) };
-        *slot = ErrorCode::NO_ERROR;
+    /// Errors are gone; `told`: and it is told.
+    pub(super) fn clear(
+        &mut self,
+        gone: impl Fn(ErrorCode, Cause) -> bool,
+        told: bool,
+    ) -> Result<(), ProducerFull> {
+        let mut any = false;
+        for (code, cause) in &mut self.active {
+            if *code != ErrorCode::NO_ERROR && gone(*code, *cause) {
+                *code = ErrorCode::NO_ERROR;
+                any = true;
+            }
+        }
+        if !(any && told) {
+            return Ok(());
+        }
         let register = self.register();
         self.producer.push(Emergency { code: ErrorCode::NO_ERROR, register, data: [0; 5] })
+    }
+
+    /// All errors of a cause are gone.
+    pub(super) fn clear_cause(&mut self, cause: Cause) {
+        // A full queue drops the message, not the register.
+        let _ = self.clear(|_, active| active == cause, true);
     }
 }
 
@@ -78,12 +96,12 @@ mod tests {
     #[test]
     fn the_register_follows_the_errors() {
         let mut errors = Errors::new();
-        errors.raise(ErrorCode::TEMPERATURE, [1; 5]).unwrap();
-        errors.raise(ErrorCode::LIFE_GUARD, [0; 5]).unwrap();
-        errors.raise(ErrorCode::LIFE_GUARD, [0; 5]).unwrap();
+        errors.raise(ErrorCode::TEMPERATURE, DEVICE, [1; 5]).unwrap();
+        errors.raise(ErrorCode::LIFE_GUARD, ERROR_CONTROL, [0; 5]).unwrap();
+        errors.raise(ErrorCode::LIFE_GUARD, ERROR_CONTROL, [0; 5]).unwrap();
         assert_eq!(errors.register(), 0x19);
-        errors.clear(ErrorCode::TEMPERATURE).unwrap();
-        errors.clear(ErrorCode::TEMPERATURE).unwrap();
+        errors.clear(|code, _| code == ErrorCode::TEMPERATURE, true).unwrap();
+        errors.clear(|code, _| code == ErrorCode::TEMPERATURE, true).unwrap();
         let mut sent = std::vec::Vec::new();
         while let Some(emergency) = errors.producer().poll_transmit(Duration::ZERO) {
             sent.push((emergency.code, emergency.register));

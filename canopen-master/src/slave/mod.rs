@@ -5,8 +5,11 @@
 //! communication area takes effect when the slave boots and when it is written: 1005h, 1006h, 1019h
 //! (SYNC), 100Ch, 100Dh (guarding), 1014h, 1015h (EMCY), 1016h, 1017h (heartbeat), 1029h (error
 //! behaviour). Objects that are not there have their defaults. 1001h and 1003h are the slave's own: a reset
-//! empties the error history, as the power-on values of the communication area do (CiA 301, 7.3.2.2.1), but
-//! errors of the device that are still there go on in the error register.
+//! empties the error history, as the power-on values of the communication area do (CiA 301, 7.3.2.2.1), and
+//! ends errors of the communication; those of the device go on in the error register.
+//!
+//! Of the communication's errors, a lost master or node is there until it is back, an RPDO that was too short
+//! or is missing until one is taken: told once, and gone with 0000h.
 
 mod configure;
 mod errors;
@@ -37,7 +40,7 @@ pub use process::Objects;
 pub type Device<'a, H, const R: usize, const T: usize, const M: usize> =
     crate::od::Objects<crate::od::Dictionary<'a, H>, R, T, M>;
 
-use errors::Errors;
+use errors::{DEVICE, Errors};
 
 /// Nodes whose heartbeat a slave watches: entries of 1016h that it acts on.
 pub const CONSUMERS: usize = 4;
@@ -203,7 +206,7 @@ impl<D: Objects> Slave<D> {
     /// # Errors
     /// [`emcy::ProducerFull`]: too many emergencies wait; the history has it all the same.
     pub fn raise(&mut self, code: ErrorCode, data: [u8; 5]) -> Result<(), emcy::ProducerFull> {
-        self.errors.raise(code, data)
+        self.errors.raise(code, DEVICE, data)
     }
 
     /// Something was wrong and is over: sends an emergency and enters it into the history (1003h), nothing
@@ -217,7 +220,7 @@ impl<D: Objects> Slave<D> {
     /// # Errors
     /// [`emcy::ProducerFull`]: too many emergencies wait.
     pub fn clear(&mut self, code: ErrorCode) -> Result<(), emcy::ProducerFull> {
-        self.errors.clear(code)
+        self.errors.clear(|active, cause| active == code && cause == DEVICE, true)
     }
 
     /// Answers LSS after [`lss::Action::Store`].

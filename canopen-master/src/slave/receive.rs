@@ -5,6 +5,7 @@ use core::time::Duration;
 use embedded_can::Id;
 use pdo::{Frame, Handled, RpdoFault, cob};
 
+use super::errors::ERROR_CONTROL;
 use super::{Event, Objects, Slave};
 use crate::emcy::ErrorCode;
 use crate::nmt::{Change, Command};
@@ -46,7 +47,7 @@ impl<D: Objects> Slave<D> {
                 let (answer, event) = self.guard.handle_request(now, self.nmt.state());
                 self.answer(answer);
                 if let Some(event) = event {
-                    let _ = self.errors.clear(ErrorCode::LIFE_GUARD);
+                    self.errors.clear_cause(ERROR_CONTROL);
                     self.tell(Event::LifeGuarding(event));
                 }
                 Handled::Taken
@@ -70,14 +71,21 @@ impl<D: Objects> Slave<D> {
     /// What RPDOs brought.
     pub(super) fn collect_pdos(&mut self) {
         while let Some((number, event)) = self.objects.poll_event() {
-            if let Err(fault) = event {
-                let (code, expected, found) = match fault {
-                    RpdoFault::TooShort(error) => (ErrorCode::PDO_LENGTH, error.expected, error.found),
-                    RpdoFault::TooLong(error) => (ErrorCode::PDO_TOO_LONG, error.expected, error.found),
-                    _ => (ErrorCode::RPDO_TIMEOUT, 0, 0),
-                };
-                let [low, high] = (0x1600 + number as u16).to_le_bytes();
-                self.errors.mention(code, [low, high, expected, found, 0]);
+            let cause = 0x1600 + number as u16;
+            let [low, high] = cause.to_le_bytes();
+            match event {
+                Ok(()) => self.errors.clear_cause(cause),
+                // Its beginning is taken.
+                Err(RpdoFault::TooLong(error)) => {
+                    self.errors.mention(ErrorCode::PDO_TOO_LONG, [low, high, error.expected, error.found, 0]);
+                }
+                Err(fault) => {
+                    let (code, expected, found) = match fault {
+                        RpdoFault::TooShort(error) => (ErrorCode::PDO_LENGTH, error.expected, error.found),
+                        _ => (ErrorCode::RPDO_TIMEOUT, 0, 0),
+                    };
+                    let _ = self.errors.raise(code, cause, [low, high, expected, found, 0]);
+                }
             }
             self.tell(Event::Rpdo(number, event));
         }
@@ -153,7 +161,7 @@ impl<D: Objects> Slave<D> {
         };
         let node = *node;
         if let Some(event) = consumer.handle(now) {
-            let _ = self.errors.clear(ErrorCode::LIFE_GUARD);
+            self.errors.clear_cause(ERROR_CONTROL);
             self.tell(Event::Heartbeat { node, event });
         }
         Handled::Taken

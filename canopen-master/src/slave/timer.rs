@@ -4,6 +4,7 @@ use core::time::Duration;
 
 use pdo::{Frame, NodeId};
 
+use super::errors::ERROR_CONTROL;
 use super::objects::number;
 use super::{CONSUMERS, Event, Objects, Slave};
 use crate::bus::BusStatus;
@@ -19,13 +20,13 @@ impl<D: Objects> Slave<D> {
         let before = core::mem::replace(&mut self.bus, status);
         match (before, status) {
             (_, BusStatus::Passive) => {
-                let _ = self.errors.raise(ErrorCode::CAN_PASSIVE, [0; 5]);
+                let _ = self.raise(ErrorCode::CAN_PASSIVE, [0; 5]);
             }
             (BusStatus::Passive, BusStatus::Active | BusStatus::Warning) => {
-                let _ = self.errors.clear(ErrorCode::CAN_PASSIVE);
+                let _ = self.clear(ErrorCode::CAN_PASSIVE);
             }
             (BusStatus::Off, BusStatus::Active | BusStatus::Warning) => {
-                let _ = self.errors.clear(ErrorCode::CAN_PASSIVE);
+                let _ = self.clear(ErrorCode::CAN_PASSIVE);
                 self.errors.mention(ErrorCode::BUS_OFF_RECOVERED, [0; 5]);
             }
             _ => {}
@@ -70,7 +71,7 @@ impl<D: Objects> Slave<D> {
     /// The master, or a node watched, is gone: emergency 8130h, and what 1029h:01 says (CiA 301,
     /// 7.5.2.26).
     fn on_lost(&mut self, now: Duration) {
-        let _ = self.errors.raise(ErrorCode::LIFE_GUARD, [0; 5]);
+        let _ = self.errors.raise(ErrorCode::LIFE_GUARD, ERROR_CONTROL, [0; 5]);
         let next = match number(&mut self.objects, 0x1029, 1, 0) as u8 {
             0 if self.state() == State::Operational => State::PreOperational,
             2 => State::Stopped,
