@@ -121,12 +121,12 @@ def emergencies(endpoint, node):
 
 
 def synchronisation(endpoint, net):
-    """A whole controller as SYNC producer."""
+    """A whole controller as SYNC producer: with one of its objects active, it works on the bus."""
     syncs = Inbox(net, 0x80)
     with tempfile.TemporaryDirectory() as directory:
         config = os.path.join(directory, "config.toml")
         with open(config, "w") as file:
-            file.write(f'[controller]\nmodel = 8230\n[can2]\nendpoint = "{endpoint}"\n')
+            file.write(f'[controller]\nmodel = 8230\n[can1]\nendpoint = "{endpoint}"\n[parameters]\n326 = "Digital"\n')
         with Process("run", config):
             check("SYNC", [syncs.get() for _ in range(5)], [b""] * 5)
     syncs.close()
