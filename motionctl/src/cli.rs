@@ -72,7 +72,7 @@ pub(crate) enum Command {
     Conform(crate::conform::Conform),
     /// Virtual CAN buses for other programs, over the socketcand protocol, until stopped
     Bus(crate::can::cli::Bus),
-    /// Serial ports found
+    /// Serial ports and CAN interfaces found
     Ports,
     /// LB2 functions one by one
     Lb2 {
@@ -87,6 +87,10 @@ pub(crate) enum Command {
     /// Captures to words, or to JSON objects one a line
     Decode(crate::decode::cli::Decode),
     /// A bus, a controller or a capture on a screen that lives, or one snapshot of it
+    ///
+    /// Keys: q, Esc and Ctrl-C end it; Tab, Shift-Tab and 1 to 9 choose a table, the arrows, Page Up and Page
+    /// Down scroll it, z gives it the whole screen; p halts the screen. Of a capture, `.` and `,` go a frame
+    /// forth and back, `>` and `<` a twentieth of it, Home and End to its ends.
     Monitor(crate::monitor::cli::Monitor),
     /// EDS, DCF, XDD and XDC files
     Eds {
@@ -101,7 +105,11 @@ pub(crate) enum Command {
     /// Completions for a shell
     Completions { shell: clap_complete::Shell },
     /// The manual page
-    Man,
+    Man {
+        /// Write the pages of all commands into this folder
+        #[arg(long, value_name = "DIR")]
+        output: Option<PathBuf>,
+    },
 }
 
 #[derive(Debug, Subcommand)]

@@ -64,7 +64,9 @@ fn main() -> ExitCode {
             output::put(script);
             Ok(())
         }
-        Command::Man => {
+        Command::Man { output: Some(folder) } => clap_mangen::generate_to(Cli::command(), &folder)
+            .map_err(|error| exit::Exit::file(&folder.display().to_string(), &error)),
+        Command::Man { output: None } => {
             let mut page = Vec::new();
             let rendered = clap_mangen::Man::new(Cli::command()).render(&mut page);
             output::put(page);
@@ -82,13 +84,26 @@ fn main() -> ExitCode {
 
 fn ports(out: &output::Output) -> Result<(), exit::Exit> {
     let ports = motion_io::port::list().map_err(|error| exit::Exit::file("serial ports", &error))?;
-    let json = ports.iter().map(|(name, text)| serde_json::json!({ "name": name, "description": text }));
-    out.document(serde_json::json!({ "serial": json.collect::<Vec<_>>() }), || {
+    let interfaces =
+        motion_io::can::interfaces().map_err(|error| exit::Exit::file("CAN interfaces", &error))?;
+    let serial = ports.iter().map(|(name, text)| serde_json::json!({ "name": name, "description": text }));
+    let can = interfaces.iter().map(
+        |(name, up)| serde_json::json!({ "name": name, "endpoint": format!("socketcan:{name}"), "up": up }),
+    );
+    let document =
+        serde_json::json!({ "serial": serial.collect::<Vec<_>>(), "can": can.collect::<Vec<_>>() });
+    out.document(document, || {
         if ports.is_empty() {
             println!("no serial ports found");
         }
         for (name, text) in &ports {
             println!("{name}  {text}");
+        }
+        if interfaces.is_empty() {
+            println!("no CAN interfaces found");
+        }
+        for (name, up) in &interfaces {
+            println!("socketcan:{name}  {}", if *up { "up" } else { "down" });
         }
     });
     Ok(())

@@ -294,3 +294,61 @@ fn conformance_of_a_node() {
         report["cases"].as_array().unwrap().iter().filter(|case| case["outcome"] == "failed").collect();
     assert_eq!((failed.len(), &failed[0]["id"]), (1, &json!("object.2F00.00.read")), "{failed:?}");
 }
+
+/// What is wrong on the command line is told before anything is opened or sent.
+#[test]
+fn wrong_usage_of_buses_and_nodes() {
+    let bench = Bench::new();
+    let says = |arguments: &[&str], status: i32, words: &str| {
+        let ended = Command::new(env!("CARGO_BIN_EXE_motionctl"))
+            .args(arguments)
+            .env("MOTIONCTL_CAN", &bench.endpoint)
+            .env_remove("MOTIONCTL_CONFIG")
+            .current_dir(bench.directory.path())
+            .stdin(Stdio::null())
+            .output()
+            .unwrap();
+        let said =
+            String::from_utf8_lossy(&ended.stdout).into_owned() + &String::from_utf8_lossy(&ended.stderr);
+        assert_eq!(ended.status.code(), Some(status), "{arguments:?}: {said}");
+        assert!(said.contains(words), "{arguments:?}: {said}");
+    };
+    says(&["bus", "--listen", "nonsense"], 2, "--listen nonsense: HOST:PORT expected");
+    says(
+        &["bus", "--listen", "127.0.0.1:0", "--bus", "a", "--bus", "b", "--bus", "a"],
+        2,
+        "two buses of one name",
+    );
+    says(&["sim", "io", "--node", "128"], 2, "1 to 127, or 255 to wait");
+    // 181 may be meant as 181h, and 6041 as 6041h: neither is guessed.
+    let write = ["can", "pdo", "write", "5", "tpdo2"];
+    says(&[&write[..], &["--id", "181"]].concat(), 2, "in hex as 0x181 or 181h");
+    says(&[&write[..], &["--map", "6041:0:16"]].concat(), 2, "0x6041:0:16 expected");
+    // The plan says what would be set.
+    let plan = ["--id", "281h", "--map", "0x6401:1:16", "6000h:1:8", "--transmission", "1", "--dry-run"];
+    let words = "would set tpdo2 of node 5 up: mapping 6401h:01, 16 bits; 6000h:01, 8 bits, identifier 281h, \
+                 transmission type 1";
+    says(&[&write[..], &plan].concat(), 0, words);
+    says(&["can", "sdo", "write", "5", "0x2000:1", "00", "--type", "bytes", "--dry-run"], 0, "1 byte to");
+}
+
+#[test]
+fn ports_and_pages() {
+    let directory = tempfile::tempdir().unwrap();
+    let run = |arguments: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_motionctl"));
+        command.args(arguments).current_dir(directory.path()).output().unwrap()
+    };
+    let ports: Value = serde_json::from_slice(&run(&["ports", "--json"]).stdout).unwrap();
+    assert!(ports["serial"].is_array() && ports["can"].is_array(), "{ports}");
+    assert_eq!(run(&["man", "--output", "."]).status.code(), Some(0));
+    for page in ["motionctl.1", "motionctl-monitor.1", "motionctl-can-sdo-read.1"] {
+        let text = std::fs::read_to_string(directory.path().join(page)).unwrap();
+        assert!(text.contains(".SH NAME"), "{page}");
+    }
+    assert_eq!(run(&["man", "--output", "nowhere"]).status.code(), Some(5));
+    for shell in ["bash", "elvish", "fish", "powershell", "zsh"] {
+        let script = run(&["completions", shell]);
+        assert!(String::from_utf8_lossy(&script.stdout).contains("monitor"), "{shell}");
+    }
+}

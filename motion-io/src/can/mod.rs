@@ -15,6 +15,7 @@ mod virtual_bus;
 use core::fmt;
 use core::time::Duration;
 use std::io;
+use std::path::Path;
 
 use pdo::Frame;
 
@@ -146,6 +147,39 @@ pub trait CanPort: Send {
     }
 }
 
+/// The CAN interfaces that the system has, by name, each with whether it is up; none where the system has no
+/// SocketCAN.
+///
+/// # Errors
+/// The system cannot tell.
+pub fn interfaces() -> io::Result<Vec<(String, bool)>> {
+    interfaces_in(Path::new("/sys/class/net"))
+}
+
+/// The same of a folder like the kernel's.
+fn interfaces_in(folder: &Path) -> io::Result<Vec<(String, bool)>> {
+    /// What the kernel calls the hardware (ARPHRD_CAN), and the flag of an interface that is up (IFF_UP).
+    const CAN: &str = "280";
+    const UP: u32 = 1;
+    let entries = match std::fs::read_dir(folder) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
+        entries => entries?,
+    };
+    let mut found = Vec::new();
+    for entry in entries {
+        let entry = entry?;
+        let read = |name: &str| std::fs::read_to_string(entry.path().join(name)).unwrap_or_default();
+        if read("type").trim() != CAN {
+            continue;
+        }
+        let flags = read("flags");
+        let flags = u32::from_str_radix(flags.trim().trim_start_matches("0x"), 16).unwrap_or(0);
+        found.push((entry.file_name().to_string_lossy().into_owned(), flags & UP != 0));
+    }
+    found.sort();
+    Ok(found)
+}
+
 /// Opens an endpoint.
 ///
 /// # Errors
@@ -187,5 +221,26 @@ pub fn open(endpoint: &CanEndpoint) -> Result<Box<dyn CanPort>, OpenError> {
                 Err(OpenError::NotBuilt { endpoint: endpoint.to_string(), feature: "virtual" })
             };
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn interfaces_are_told_from_others() {
+        let folder = tempfile::tempdir().unwrap();
+        for (name, kind, flags) in
+            [("vcan0", "280\n", "0xc1\n"), ("can0", "280\n", "0x80\n"), ("eth0", "1\n", "0x1003\n")]
+        {
+            std::fs::create_dir(folder.path().join(name)).unwrap();
+            std::fs::write(folder.path().join(name).join("type"), kind).unwrap();
+            std::fs::write(folder.path().join(name).join("flags"), flags).unwrap();
+        }
+        std::fs::write(folder.path().join("bonding_masters"), "").unwrap();
+        let found = interfaces_in(folder.path()).unwrap();
+        assert_eq!(found, [("can0".to_owned(), false), ("vcan0".to_owned(), true)]);
+        assert_eq!(interfaces_in(&folder.path().join("nothing")).unwrap(), []);
     }
 }

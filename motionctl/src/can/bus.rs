@@ -11,15 +11,21 @@ use crate::output::Output;
 
 pub(crate) fn run(out: &Output, arguments: &Bus) -> Result<(), Exit> {
     let names = if arguments.bus.is_empty() { vec!["can0".into()] } else { arguments.bus.clone() };
-    for name in &names {
+    for (at, name) in names.iter().enumerate() {
         if name.is_empty() || name.contains(|c: char| c.is_whitespace() || c == '<' || c == '>') {
             return Err(Exit::usage(format!("--bus {name:?}: a name without blanks and brackets expected")));
+        }
+        if names.iter().take(at).any(|other| other == name) {
+            return Err(Exit::usage(format!("--bus {name}: two buses of one name")));
         }
     }
     let buses = names.iter().map(|name| (name.clone(), VirtualBus::new(arguments.bitrate, Faults::NONE)));
     let stop = stop_flag()?;
-    let server = Server::bind(&arguments.listen, buses.collect())
-        .map_err(|error| Exit::trouble(format!("{}: {error}", arguments.listen)))?;
+    let listen = &arguments.listen;
+    let server = Server::bind(listen, buses.collect()).map_err(|error| match error.kind() {
+        std::io::ErrorKind::InvalidInput => Exit::usage(format!("--listen {listen}: HOST:PORT expected")),
+        _ => Exit::trouble(format!("{listen}: {error}")),
+    })?;
     let address = server.address().map_err(|error| Exit::trouble(error.to_string()))?.to_string();
     let document =
         json!({ "event": "ready", "listen": address, "buses": names, "bitrate": arguments.bitrate });

@@ -1,8 +1,12 @@
 //! The command line of `can`, `bus` and of the virtual nodes.
 
+use core::time::Duration;
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand, ValueEnum};
+
+use super::session::duration;
+use crate::exit::Exit;
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct Bus {
@@ -149,6 +153,12 @@ pub(crate) struct Stream {
     /// Stop after so many seconds
     #[arg(long = "for", value_name = "S")]
     pub(crate) seconds: Option<f64>,
+}
+
+impl Stream {
+    pub(crate) fn limit(&self) -> Result<Option<Duration>, Exit> {
+        self.seconds.map(|seconds| duration("--for", seconds)).transpose()
+    }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

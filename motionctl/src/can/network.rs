@@ -7,15 +7,18 @@ use canopen_master::NodeSet;
 use canopen_master::guarding::{self, Event as GuardEvent};
 use canopen_master::master::Event;
 use canopen_master::nmt::{Command, State, Target};
+use canopen_master::trace::Tracer;
 use canopen_master::{NodeId, scan};
-use motion_io::can::Event as PortEvent;
+use motion_io::can::{Event as PortEvent, open};
 use serde_json::{Value, json};
 
 use super::cli::{CanLine, Nmt, Stream};
-use super::session::{Session, duration, node_id};
+use super::record::listen;
+use super::session::{Session, duration, endpoint, node_id};
 use super::stop_flag;
 use super::value::hex;
 use crate::cli::Global;
+use crate::decode::{kind_name, node_of};
 use crate::exit::Exit;
 use crate::output::Output;
 
@@ -204,10 +207,7 @@ fn stream(
     mut turn: impl FnMut(&mut Session, Duration) -> Result<(), Exit>,
 ) -> Result<(), Exit> {
     let stop = stop_flag()?;
-    let end = match stream.seconds {
-        Some(seconds) => session.now() + duration("--for", seconds)?,
-        None => Duration::MAX,
-    };
+    let end = stream.limit()?.map_or(Duration::MAX, |limit| session.now().saturating_add(limit));
     while !stop.load(Ordering::Relaxed) && session.now() < end {
         let limit = (session.now() + STEP).min(end);
         turn(session, limit)?;
@@ -288,83 +288,40 @@ pub(crate) fn emcy(out: &Output, global: &Global, line: &CanLine, run: &Stream) 
 }
 
 pub(crate) fn monitor(out: &Output, global: &Global, line: &CanLine, run: &Stream) -> Result<(), Exit> {
-    let mut session = Session::open(global, line)?;
-    // A reply that answers a remote request is a guard reply, whatever its toggle.
-    let mut asked = NodeSet::EMPTY;
-    stream(&mut session, run, |session, limit| {
-        session.turn(limit, |now, event, _| {
-            let t = now.as_secs_f64();
-            match event {
-                PortEvent::Frame(frame) => {
-                    let (kind, node) = kind(&frame, &mut asked);
-                    let (id, extended) = match frame.id() {
-                        embedded_can::Id::Standard(id) => (u32::from(id.as_raw()), false),
-                        embedded_can::Id::Extended(id) => (id.as_raw(), true),
-                    };
-                    let document = json!({
-                        "t": t,
-                        "id": id,
-                        "ext": extended,
-                        "rtr": frame.is_remote(),
-                        "data": hex(frame.data()),
-                        "node": node,
-                        "kind": kind,
-                    });
-                    out.line(document, || format!("{t:10.6}  {frame}  {kind}"));
-                }
-                PortEvent::Bus(event) => {
-                    let text = event.to_string();
-                    let document = json!({ "t": t, "kind": "error-frame", "text": text });
-                    out.line(document, || format!("{t:10.6}  {text}"));
-                }
-                _ => {}
+    let limit = run.limit()?;
+    let mut port = open(&endpoint(global, line)?).map_err(|error| Exit::trouble(error.to_string()))?;
+    let mut tracer = Tracer::new();
+    listen(&mut *port, limit, &*stop_flag()?, |now, event| {
+        let t = now.as_secs_f64();
+        match event {
+            PortEvent::Frame(frame) => {
+                let kind = tracer.handle_frame(Some(now), 0, &frame);
+                while tracer.poll_event().is_some() {}
+                let (name, node) = (kind_name(&kind), node_of(&kind));
+                let (id, extended) = match frame.id() {
+                    embedded_can::Id::Standard(id) => (u32::from(id.as_raw()), false),
+                    embedded_can::Id::Extended(id) => (id.as_raw(), true),
+                };
+                let document = json!({
+                    "t": t,
+                    "id": id,
+                    "ext": extended,
+                    "rtr": frame.is_remote(),
+                    "data": hex(frame.data()),
+                    "node": node,
+                    "kind": name,
+                });
+                out.line(document, || format!("{t:10.6}  {frame}  {name}"));
             }
-        })?;
-        while session.master().poll_event().is_some() {}
+            PortEvent::Bus(event) => {
+                let text = event.to_string();
+                let document = json!({ "t": t, "kind": "error-frame", "text": text });
+                out.line(document, || format!("{t:10.6}  {text}"));
+            }
+            _ => {}
+        }
         Ok(())
     })
-}
-
-/// What a frame is for by its identifier, in the words of `decode`.
-fn kind(frame: &pdo::Frame, asked: &mut NodeSet) -> (&'static str, Option<u8>) {
-    use pdo::cob::Service;
-    let Some(service) = Service::of_frame(frame) else { return ("unknown", None) };
-    let node = service.node().map(NodeId::raw);
-    let kind = match service {
-        Service::Nmt => "nmt",
-        Service::Sync => "sync",
-        Service::Time => "time",
-        Service::Emcy(_) => "emcy",
-        Service::Tpdo(..) | Service::Rpdo(..) => "pdo",
-        Service::SdoRequest(_) => {
-            if frame.data().first() == Some(&0x80) {
-                "sdo-abort"
-            } else {
-                "sdo-request"
-            }
-        }
-        Service::SdoResponse(_) => {
-            if frame.data().first() == Some(&0x80) {
-                "sdo-abort"
-            } else {
-                "sdo-response"
-            }
-        }
-        Service::ErrorControl(node) if frame.is_remote() => {
-            asked.insert(node);
-            "guard-request"
-        }
-        Service::ErrorControl(node) => match frame.data() {
-            [0] => "boot-up",
-            [_] if asked.remove(node) => "guard-reply",
-            [state] if state & 0x80 != 0 => "guard-reply",
-            [_] => "heartbeat",
-            _ => "unknown",
-        },
-        Service::LssRequest | Service::LssResponse => "lss",
-        _ => "unknown",
-    };
-    (kind, node)
 }
 
 #[cfg(test)]

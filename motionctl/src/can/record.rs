@@ -1,20 +1,20 @@
 //! `motionctl can record`: a bus into a capture file.
 
-use core::sync::atomic::Ordering;
+use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
 use std::fs::File;
 use std::io::{self, BufWriter};
 use std::path::Path;
-use std::time::{Instant, SystemTime};
+use std::time::SystemTime;
 
 use embedded_can::Frame as _;
-use motion_io::can::{Event, open};
+use motion_io::can::{CanPort, Event, open};
 use motion_io::capture::{Frame, FrameKind, Record, Time, WriteFormat, Writer};
 use serde_json::json;
 
 use super::cli::{CanLine, Stream};
 use super::network::STEP;
-use super::session::{duration, endpoint, gone};
+use super::session::{endpoint, gone};
 use super::stop_flag;
 use crate::cli::Global;
 use crate::exit::Exit;
@@ -55,6 +55,27 @@ fn now() -> Time {
     Time(i64::try_from(now.as_nanos() / 1000 * 1000).unwrap_or(i64::MAX))
 }
 
+/// Listens on an open endpoint, on which nothing is sent, for `limit` or until stopped.
+pub(super) fn listen(
+    port: &mut dyn CanPort,
+    limit: Option<Duration>,
+    stop: &AtomicBool,
+    mut take: impl FnMut(Duration, Event) -> Result<(), Exit>,
+) -> Result<(), Exit> {
+    let start = port.now();
+    while !stop.load(Ordering::Relaxed) {
+        let passed = port.now().saturating_sub(start);
+        let left = limit.map_or(Duration::MAX, |limit| limit.saturating_sub(passed));
+        if left.is_zero() {
+            break;
+        }
+        if let Some(event) = port.receive(left.min(STEP)).map_err(|error| gone(&error))? {
+            take(port.now().saturating_sub(start), event)?;
+        }
+    }
+    Ok(())
+}
+
 pub(super) fn run(
     out: &Output,
     global: &Global,
@@ -63,7 +84,7 @@ pub(super) fn run(
     run: &Stream,
 ) -> Result<(), Exit> {
     let format = format_of(path)?;
-    let limit = run.seconds.map(|seconds| duration("--for", seconds)).transpose()?;
+    let limit = run.limit()?;
     let endpoint = endpoint(global, line)?;
     let name = path.display().to_string();
     let trouble = |error: io::Error| Exit::file(&name, &error);
@@ -74,24 +95,23 @@ pub(super) fn run(
     out.document(json!({ "event": "ready", "endpoint": text, "file": name }), || {
         println!("recording {text} to {name}");
     });
-    let (start, mut frames) = (Instant::now(), 0u64);
-    while !stop.load(Ordering::Relaxed) {
-        let left = limit.map_or(Duration::MAX, |limit| limit.saturating_sub(start.elapsed()));
-        if left.is_zero() {
-            break;
-        }
-        match port.receive(left.min(STEP)).map_err(|error| gone(&error))? {
-            Some(Event::Frame(frame)) => {
+    let mut frames = 0u64;
+    let heard = listen(&mut *port, limit, &stop, |_, event| {
+        match event {
+            Event::Frame(frame) => {
                 if let Some(record) = recorded(&frame, now()) {
                     writer.write(&record, None).map_err(trouble)?;
                     frames += 1;
                 }
             }
-            Some(Event::Bus(event)) => out.remark(event.to_string()),
+            Event::Bus(event) => out.remark(event.to_string()),
             _ => {}
         }
-    }
+        Ok(())
+    });
+    // What was recorded is kept, whatever ended it.
     writer.finish().map_err(trouble)?;
+    heard?;
     out.document(json!({ "event": "recorded", "frames": frames }), || println!("{frames} frames"));
     Ok(())
 }

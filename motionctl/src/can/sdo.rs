@@ -7,7 +7,7 @@ use super::session::{Session, TransferError, node_id};
 use super::value::{address, data_type, decode, device, encode, hex};
 use crate::cli::Global;
 use crate::exit::Exit;
-use crate::output::Output;
+use crate::output::{Output, counted};
 
 pub(crate) fn run(out: &Output, global: &Global, command: &Sdo) -> Result<(), Exit> {
     match command {
@@ -33,7 +33,9 @@ pub(crate) fn run(out: &Output, global: &Global, command: &Sdo) -> Result<(), Ex
                 document["value"] = value.clone();
             }
             out.document(document, || match (&value, output) {
-                (_, Some(path)) => println!("{} bytes written to {}", data.len(), path.display()),
+                (_, Some(path)) => {
+                    println!("{} written to {}", counted(data.len(), "byte", "bytes"), path.display());
+                }
                 (Some(serde_json::Value::String(text)), None) => println!("{text}"),
                 (Some(value), None) => println!("{value}"),
                 (None, None) => println!("{}", hex(&data)),
@@ -55,7 +57,8 @@ pub(crate) fn run(out: &Output, global: &Global, command: &Sdo) -> Result<(), Ex
                 (None, None) => return Err(Exit::usage("a value or --file expected")),
             };
             if global.dry_run {
-                out.say(&format!("would write {} bytes to {at} of node {}", data.len(), object.node));
+                let bytes = counted(data.len(), "byte", "bytes");
+                out.say(&format!("would write {bytes} to {at} of node {}", object.node));
                 return Ok(());
             }
             let mut session = Session::open(global, &object.line)?;
@@ -71,7 +74,10 @@ pub(crate) fn run(out: &Output, global: &Global, command: &Sdo) -> Result<(), Ex
                 "size": size,
                 "data": shown,
             });
-            out.document(document, || println!("{size} bytes written to {at} of node {}", object.node));
+            out.document(document, || {
+                let bytes = counted(size, "byte", "bytes");
+                println!("{bytes} written to {at} of node {}", object.node);
+            });
             Ok(())
         }
     }

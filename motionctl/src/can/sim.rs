@@ -10,7 +10,7 @@ use pdo::NodeId;
 use serde_json::json;
 
 use super::cli::{SimFile, SimIo, SimNode};
-use super::session::{endpoint, node_id};
+use super::session::endpoint;
 use super::stop_flag;
 use crate::cli::Global;
 use crate::exit::Exit;
@@ -23,7 +23,12 @@ const NO_NODE: u8 = 255;
 
 /// The address of a virtual node; `None` waits for one over LSS.
 pub(crate) fn address(node: u8) -> Result<Option<NodeId>, Exit> {
-    if node == NO_NODE { Ok(None) } else { node_id(node).map(Some) }
+    if node == NO_NODE {
+        return Ok(None);
+    }
+    NodeId::new(node).map(Some).map_err(|_| {
+        Exit::usage(format!("--node {node}: 1 to 127, or 255 to wait for one over LSS expected"))
+    })
 }
 
 pub(crate) fn drive(out: &Output, global: &Global, arguments: &SimNode) -> Result<(), Exit> {

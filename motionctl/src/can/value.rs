@@ -80,11 +80,15 @@ pub(crate) fn number(text: &str) -> Option<i128> {
     Some(sign * value)
 }
 
+/// A number that is marked as hexadecimal, `0x1F` or `1Fh`: what indices and identifiers are written in.
+pub(crate) fn hexadecimal(text: &str) -> Option<u32> {
+    let marked = text.starts_with("0x") || text.starts_with("0X") || text.ends_with(['h', 'H']);
+    number(text).filter(|_| marked).and_then(|value| u32::try_from(value).ok())
+}
+
 /// `0x6041`, `6041h`, `0x1018:1`, or a name of the device file.
 pub(crate) fn address(text: &str, device: Option<&eds::Device>) -> Result<Address, Exit> {
-    let marked = |text: &str| text.starts_with("0x") || text.starts_with("0X") || text.ends_with(['h', 'H']);
-    let index =
-        |text: &str| number(text).filter(|_| marked(text)).and_then(|index| u16::try_from(index).ok());
+    let index = |text: &str| hexadecimal(text).and_then(|index| u16::try_from(index).ok());
     let (first, sub) = match text.split_once(':') {
         Some((first, sub)) => (first, number(sub).and_then(|sub| u8::try_from(sub).ok())),
         None => (text, Some(0)),

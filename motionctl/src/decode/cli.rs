@@ -1,7 +1,9 @@
 //! Arguments of `motionctl decode`.
 
+use std::io::Read;
+
 use clap::{Args, ValueEnum};
-use motion_io::capture::{Format, Times};
+use motion_io::capture::{Capture, CaptureError, Format, Times, open, open_as};
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct Decode {
@@ -9,24 +11,45 @@ pub(crate) struct Decode {
     /// LB2 as bytes or hex text
     #[arg(required = true, value_name = "FILE")]
     pub(crate) files: Vec<String>,
+    #[command(flatten)]
+    pub(crate) reading: Reading,
+    /// Say every frame, not only what happens
+    #[arg(long)]
+    pub(crate) frames: bool,
+}
+
+/// How traffic is to be understood.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct Reading {
     /// EDS or DCF that names a node's objects and says its PDO mapping
     #[arg(long, value_name = "NODE=FILE")]
     pub(crate) eds: Vec<String>,
-    /// A node is a LinMot drive, though the capture does not show its vendor
+    /// A node is a LinMot drive, though the traffic does not show its vendor
     #[arg(long, value_name = "NODE", value_parser = clap::value_parser!(u8).range(1..=127))]
     pub(crate) linmot: Vec<u8>,
     /// 101h to 10Eh are channels of CAN Link
     #[arg(long)]
     pub(crate) can_link: bool,
-    /// Say every frame, not only what happens
-    #[arg(long)]
-    pub(crate) frames: bool,
-    /// Format, in place of the one that the content shows
+    /// Format of a capture, in place of the one that the content shows
     #[arg(long, value_enum)]
     pub(crate) format: Option<FormatName>,
     /// What times of CAN captures are since, in place of what the content shows
     #[arg(long, value_enum)]
     pub(crate) times: Option<TimesName>,
+}
+
+impl Reading {
+    /// Opens a capture.
+    pub(crate) fn open<R: Read>(&self, source: R) -> Result<Capture<R>, CaptureError> {
+        let mut capture = match self.format {
+            Some(format) => open_as(source, format.into()),
+            None => open(source),
+        }?;
+        if let (Capture::Can(reader), Some(times)) = (&mut capture, self.times) {
+            reader.set_times(times.into());
+        }
+        Ok(capture)
+    }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

@@ -5,12 +5,11 @@ use std::io::{Read, Write};
 
 use lb2::frame::{Damage, DamageKind, Decoder, Frame, Item, MAX_WIRE, encode};
 use lb2::telegram::{self, Echo, Request, Response, Text, function};
-use motion_io::capture::{CaptureError, Chunk, Lb2Reader, Time};
+use motion_io::capture::{CaptureError, Chunk, Damage as LineDamage, Lb2Reader, Time};
 use serde_json::{Map, Value, json};
 
-use super::{LB2, Stop, Totals, report};
+use super::{LB2, Stop, Totals};
 use crate::exit::Exit;
-use crate::output::Output;
 
 /// Who sent a telegram.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -360,15 +359,16 @@ fn name(function: u8, sub: Option<u8>) -> Option<String> {
 }
 
 pub(super) fn decode<R: Read>(
-    out: &Output,
+    json: bool,
     file: &str,
     mut reader: Lb2Reader<R>,
     totals: &mut Totals,
     stdout: &mut impl Write,
+    mut damaged: impl FnMut(&LineDamage),
 ) -> Result<(), Stop> {
     let mut decoder = Decoder::new();
     let mut teller = Teller {
-        json: out.json,
+        json,
         totals,
         stdout,
         listener: Listener { before: Before::Nothing },
@@ -381,7 +381,7 @@ pub(super) fn decode<R: Read>(
         match chunk {
             Chunk::Damage(damage) => {
                 teller.totals.damaged += 1;
-                report(file, &damage);
+                damaged(&damage);
             }
             Chunk::Bytes { time, bytes } => {
                 teller.times.lines.push_back((decoder.position(), time));

@@ -14,7 +14,7 @@ pub(crate) mod story;
 use std::io::{self, BufWriter, Read, Write};
 
 use canopen_master::trace::Kind;
-use motion_io::capture::{Capture, CaptureError, Damage, FrameKind, Item, Reader, open, open_as};
+use motion_io::capture::{Capture, CaptureError, Damage, FrameKind, Item, Lb2Reader, Reader};
 
 use crate::exit::Exit;
 use crate::output::Output;
@@ -87,6 +87,26 @@ const fn name_of(frame: FrameKind, kind: &Kind) -> usize {
     }
 }
 
+/// What a frame is called that came from a bus.
+pub(crate) const fn kind_name(kind: &Kind) -> &'static str {
+    NAMES[name_of(FrameKind::Data, kind)]
+}
+
+/// Whom a frame is from or for; an NMT command to all nodes is for 0.
+pub(crate) const fn node_of(kind: &Kind) -> Option<u8> {
+    Some(match *kind {
+        Kind::Nmt { target, .. } => target,
+        Kind::Emcy { node, .. }
+        | Kind::Pdo { node, .. }
+        | Kind::GuardRequest { node, .. }
+        | Kind::GuardReply { node, .. }
+        | Kind::Heartbeat { node, .. }
+        | Kind::BootUp { node, .. } => node.raw(),
+        Kind::SdoRequest(frame) | Kind::SdoResponse(frame) | Kind::SdoAbort(frame) => frame.node.raw(),
+        _ => return None,
+    })
+}
+
 impl Totals {
     fn count(&mut self, name: usize, copy: bool) {
         self.frames += 1;
@@ -131,7 +151,7 @@ impl From<io::Error> for Stop {
 }
 
 pub(crate) fn run(out: &Output, args: &Decode) -> Result<(), Exit> {
-    let names = Names::read(&args.eds, &args.linmot)?;
+    let names = Names::read(&args.reading.eds, &args.reading.linmot)?;
     let mut totals = Totals::default();
     let mut stdout = BufWriter::with_capacity(BLOCK, io::stdout().lock());
     let mut decode = || -> Result<(), Stop> {
@@ -168,17 +188,12 @@ fn decode_file(
     } else {
         Box::new(std::fs::File::open(file).map_err(|error| Exit::file(file, &error))?)
     };
-    let capture = match args.format {
-        Some(format) => open_as(source, format.into()),
-        None => open(source),
-    };
-    match capture.map_err(failed)? {
-        Capture::Lb2(reader) => lb2::decode(out, file, reader, totals, stdout),
-        Capture::Can(mut reader) => {
-            if let Some(times) = args.times {
-                reader.set_times(times.into());
-            }
-            let mut ear = Ear::new(names, args.can_link);
+    match args.reading.open(source).map_err(failed)? {
+        Capture::Lb2(reader) => {
+            lb2::decode(out.json, file, reader, totals, stdout, |damage| report(file, damage))
+        }
+        Capture::Can(reader) => {
+            let mut ear = Ear::new(names, args.reading.can_link);
             if out.json {
                 decode_can(file, reader, &mut ear, &mut Json::new(names), totals, stdout)
             } else {
@@ -188,6 +203,20 @@ fn decode_file(
                 Ok(stdout.write_all(story.text())?)
             }
         }
+    }
+}
+
+/// An LB2 line in words or, with `json`, as objects, written to `to`.
+pub(crate) fn decode_lb2<R: Read>(
+    json: bool,
+    file: &str,
+    reader: Lb2Reader<R>,
+    to: &mut impl Write,
+    damaged: impl FnMut(&Damage),
+) -> Result<(), Exit> {
+    match lb2::decode(json, file, reader, &mut Totals::default(), to, damaged) {
+        Ok(()) | Err(Stop::Enough) => Ok(()),
+        Err(Stop::Failed(exit)) => Err(exit),
     }
 }
 

@@ -16,6 +16,8 @@ use crate::can::session::gone;
 use crate::decode::names::Names;
 use crate::exit::Exit;
 
+/// How long a bus is listened to for one snapshot, unless `--for` says otherwise.
+const ONCE: Duration = Duration::from_secs(1);
 /// Frames that are taken before the screen and the keys are looked after again.
 const BATCH: usize = 2000;
 
@@ -33,7 +35,7 @@ impl<'a> Listening<'a> {
             (given, _) => given,
         };
         let port = open(endpoint).map_err(|error| Exit::trouble(error.to_string()))?;
-        let mut buses = Buses::new(endpoint.to_string(), names, args.can_link, bit_rate);
+        let mut buses = Buses::new(endpoint.to_string(), names, args.reading.can_link, bit_rate);
         buses.set_now(Time(0));
         Ok(Self { start: port.now(), port, buses })
     }
@@ -64,6 +66,10 @@ impl Subject for Listening<'_> {
             wait = Duration::ZERO;
         }
         Ok(())
+    }
+
+    fn enough(&self, heard_for: Duration) -> bool {
+        heard_for >= ONCE
     }
 
     fn sheet(&self) -> Sheet {

@@ -1,19 +1,25 @@
 //! `motionctl monitor`: a bus, a controller or a capture on a screen, or one snapshot of it.
 //!
-//! What is known of the subject (`bus`, fed by `listen` and `replay`; `controller`, fed by its poller) is
+//! What is known of the subject (`bus`, fed by `listen` and `replay`; `controller`, fed by `poll`; `line`) is
 //! kept apart from the screen: it gives a `sheet` of tables, which `screen` draws and `--once` prints, and a
 //! JSON document.
 
 mod bus;
 pub(crate) mod cli;
+mod controller;
 mod draw;
+mod line;
 mod listen;
 mod nodes;
+mod poll;
+mod replay;
 mod screen;
 mod sheet;
 mod traffic;
 
+use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
+use std::time::Instant;
 
 use serde_json::Value;
 
@@ -21,16 +27,15 @@ use crate::cli::Global;
 use crate::decode::names::Names;
 use crate::exit::Exit;
 use crate::output::Output;
-use cli::Monitor;
+use cli::{Monitor, Source};
 use sheet::Sheet;
-
-/// How long a live source is listened to for one snapshot, unless `--for` says otherwise.
-const ONCE: Duration = Duration::from_secs(1);
 
 /// What a monitor shows.
 trait Subject {
     /// Takes in what comes, waiting for it no longer than `wait`; whether something new may be shown.
     fn advance(&mut self, wait: Duration) -> Result<(), Exit>;
+    /// Whether enough is known for one snapshot, after so long.
+    fn enough(&self, heard_for: Duration) -> bool;
     /// For people.
     fn sheet(&self) -> Sheet;
     /// For programs.
@@ -55,40 +60,42 @@ enum Step {
 }
 
 pub(crate) fn run(out: &Output, global: &Global, args: &Monitor) -> Result<(), Exit> {
-    let limit = args.stream.seconds.map(|seconds| crate::can::session::duration("--for", seconds));
-    let limit = limit.transpose()?;
+    let limit = args.stream.limit()?;
     if out.json && !args.once {
         return Err(Exit::usage("--json needs --once: the screen is for people"));
     }
     if !args.once {
         screen::needs_terminal()?;
     }
-    let names = Names::read(&args.eds, &args.linmot)?;
+    let reading = &args.reading;
+    let names = Names::read(&reading.eds, &reading.linmot)?;
     let mut subject: Box<dyn Subject + '_> = match args.source(global)? {
-        cli::Source::Can(endpoint) => Box::new(listen::Listening::open(&endpoint, &names, args)?),
+        Source::Can(endpoint) => Box::new(listen::Listening::open(&endpoint, &names, args)?),
+        Source::Port(line) => Box::new(poll::Asking::open(out, global, &line, args, !args.once)?),
+        Source::Capture(file) => replay::open(&file, reading, &names, args.bitrate)?,
     };
     if args.once {
         let stop = crate::can::stop_flag()?;
-        once(out, &mut *subject, limit.unwrap_or(ONCE), &stop)
+        once(out, &mut *subject, limit, &stop)
     } else {
         screen::show(out, &mut *subject, limit)
     }
 }
 
-/// One snapshot, after the source has been listened to.
+/// One snapshot, after the source has been listened to for `limit`, or for as long as it takes.
 fn once(
     out: &Output,
     subject: &mut dyn Subject,
-    limit: Duration,
-    stop: &core::sync::atomic::AtomicBool,
+    limit: Option<Duration>,
+    stop: &AtomicBool,
 ) -> Result<(), Exit> {
-    let start = std::time::Instant::now();
-    loop {
-        let left = limit.saturating_sub(start.elapsed());
-        if left.is_zero() || stop.load(core::sync::atomic::Ordering::Relaxed) {
+    let start = Instant::now();
+    while !stop.load(Ordering::Relaxed) {
+        let passed = start.elapsed();
+        if limit.map_or_else(|| subject.enough(passed), |limit| passed >= limit) {
             break;
         }
-        subject.advance(left.min(screen::TURN))?;
+        subject.advance(screen::TURN)?;
     }
     out.document(subject.document(), || crate::output::put(subject.sheet().text()));
     Ok(())

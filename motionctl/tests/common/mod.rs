@@ -63,8 +63,9 @@ impl Bench {
         let mut said = BufReader::new(child.stdout.take().unwrap());
         let mut line = String::new();
         said.read_line(&mut line).unwrap();
+        let device = Controller { child, _said: said };
         assert!(line.contains("listening on "), "{line:?}");
-        (Controller { child, _said: said }, line)
+        (device, line)
     }
 }
 

@@ -14,7 +14,7 @@ use self::change::{Failed, Setup, change};
 use super::cli::{CanLine, Pdo};
 use super::sdo::tell;
 use super::session::{Session, node_id};
-use super::value::{hex, number};
+use super::value::{hex, hexadecimal, number};
 use crate::cli::Global;
 use crate::exit::Exit;
 use crate::output::Output;
@@ -90,7 +90,22 @@ pub(crate) fn run(out: &Output, global: &Global, command: &Pdo) -> Result<(), Ex
             }
             let id = id.as_deref().map(identifier).transpose()?;
             if global.dry_run {
-                out.say(&format!("would set {pdo} of node {node} up"));
+                let entry = |entry: &u32| {
+                    format!("{:04X}h:{:02X}, {} bits", entry >> 16, entry >> 8 & 0xFF, entry & 0xFF)
+                };
+                let parts = [
+                    map.as_ref().map(|map| {
+                        format!("mapping {}", map.iter().map(entry).collect::<Vec<_>>().join("; "))
+                    }),
+                    id.map(|id| format!("identifier {id:03X}h")),
+                    transmission.map(|kind| format!("transmission type {kind}")),
+                    inhibit.map(|time| format!("inhibit time {time} x 100 µs")),
+                    event.map(|time| format!("event timer {time} ms")),
+                    off.then(|| "switched off".to_owned()),
+                ];
+                let parts: Vec<String> = parts.into_iter().flatten().collect();
+                let parts = if parts.is_empty() { "as it is".to_owned() } else { parts.join(", ") };
+                out.say(&format!("would set {pdo} of node {node} up: {parts}"));
                 return Ok(());
             }
             let session = Session::open(global, line)?;
@@ -171,18 +186,23 @@ fn print(document: &Value) {
 /// `0x6041:0:16`.
 fn entry(text: &str) -> Result<u32, Exit> {
     let wrong = || Exit::usage(format!("--map {text:?}: INDEX:SUB:BITS such as 0x6041:0:16 expected"));
-    let parts: Option<Vec<i128>> = text.split(':').map(number).collect();
-    match parts.as_deref() {
-        Some(&[index @ 0..=0xFFFF, sub @ 0..=0xFF, bits @ 1..=64]) => {
-            Ok((index as u32) << 16 | (sub as u32) << 8 | bits as u32)
+    let mut parts = text.splitn(3, ':');
+    let index = parts.next().and_then(hexadecimal);
+    let rest: Option<Vec<i128>> = parts.map(number).collect();
+    match (index, rest.as_deref()) {
+        (Some(index @ 0..=0xFFFF), Some(&[sub @ 0..=0xFF, bits @ 1..=64])) => {
+            Ok(index << 16 | (sub as u32) << 8 | bits as u32)
         }
         _ => Err(wrong()),
     }
 }
 
+/// An identifier, marked as hexadecimal: 181 could be 181h or 0B5h.
 fn identifier(text: &str) -> Result<u32, Exit> {
-    let known = number(text).and_then(|id| u32::try_from(id).ok()).filter(|id| (1..=0x7FF).contains(id));
-    known.ok_or_else(|| Exit::usage(format!("--id {text:?}: 0x001 to 0x7FF expected")))
+    let known = hexadecimal(text).filter(|id| (1..=0x7FF).contains(id));
+    known.ok_or_else(|| {
+        Exit::usage(format!("--id {text:?}: 0x001 to 0x7FF expected, in hex as 0x181 or 181h"))
+    })
 }
 
 /// `motionctl can dcf NODE FILE`.
