@@ -14,6 +14,7 @@ use serde_json::json;
 
 use crate::can::{self, stop_flag};
 use crate::cli::{Global, Sim};
+use crate::connect::{ChoiceOf, choose};
 use crate::exit::Exit;
 use crate::output::Output;
 use crate::run;
@@ -27,8 +28,13 @@ pub(crate) fn start(out: &Output, global: &Global, command: &Sim) -> Result<(), 
         Sim::Drive(arguments) => return can::sim::drive(out, global, arguments),
         Sim::Io(arguments) => return can::sim::io(out, global, arguments),
         Sim::Node(arguments) => return can::sim::file(out, global, arguments),
-        Sim::Linmot(arguments) => return crate::linmot::sim::run(out, arguments),
+        Sim::Linmot(arguments) => return crate::linmot::sim::run(out, global, arguments),
     };
+    let named = |given: Option<&str>, what| given.map(|given| choose(global, Some(given), what)).transpose();
+    let serial = named(serial, ChoiceOf::Port)?;
+    let [can1, can2] = can;
+    let can = [named(can1, ChoiceOf::Can)?, named(can2, ChoiceOf::Can)?];
+    let (serial, can) = (serial.as_deref(), can.each_ref().map(Option::as_deref));
     let Some(line) = serial.filter(|_| can == [None; 2] && set.is_empty()) else {
         let whole = run::Device { model, number: device, serial, can, parameters: set, state };
         return run::device(out, &whole);

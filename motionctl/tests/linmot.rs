@@ -289,6 +289,24 @@ fn the_endpoint_may_come_from_the_environment_or_the_configuration() {
     bench.run(&[&get[..], &["--config", "none.toml"]].concat()).ends(5).says("none.toml");
 }
 
+/// A name means the same to the virtual device as to its client.
+#[test]
+fn virtual_devices_know_the_names_of_the_configuration() {
+    let bench = Bench::new();
+    let endpoints = "[endpoints]\nbus = \"slcan-pty:BUS\"\nline = \"pty:LINE\"\ngel = \"pty:GEL\"\n";
+    std::fs::write(bench.path("S.toml"), endpoints).unwrap();
+    let sim = |arguments: &[&str]| bench.device(&[&["--config", "S.toml", "sim"], arguments].concat());
+    let _devices = [
+        sim(&["linmot", "--can", "bus"]),
+        sim(&["linmot", "--serial", "line"]),
+        sim(&["controller", "--serial", "gel"]),
+    ];
+    bench.run(&["linmot", "params", "get", "13A2h", "--can", "slcan:BUS"]).ends(0).says("default 10");
+    bench.run(&["linmot", "params", "get", "13A2h", "--port", "LINE"]).ends(0).says("default 10");
+    bench.run(&["lb2", "identify", "--port", "GEL"]).ends(0);
+    bench.run(&["--config", "S.toml", "sim", "linmot", "--can", "other"]).ends(2).says("other");
+}
+
 #[test]
 fn a_dry_run_of_reading_a_curve_touches_nothing() {
     let bench = Bench::new();

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand, ValueEnum};
+use linmot::code::ParameterType;
 use linmot::upid::Upid;
 
 #[derive(Debug, Clone, Args)]
@@ -105,6 +106,9 @@ pub(crate) enum Params {
         upid: Upid,
         #[command(flatten)]
         memory: Memory,
+        /// The parameter's type, which no command of the drive tells; without, by its minimum and maximum
+        #[arg(long = "type", value_enum, value_name = "T")]
+        kind: Option<TypeName>,
     },
     /// Write one parameter; without --ram, --rom or --both: both of a live one, ROM of others
     Set {
@@ -115,6 +119,9 @@ pub(crate) enum Params {
         upid: Upid,
         #[command(flatten)]
         memory: Memory,
+        /// The parameter's type, which no command of the drive tells; without, by its minimum and maximum
+        #[arg(long = "type", value_enum, value_name = "T")]
+        kind: Option<TypeName>,
         /// Decimal, or raw in hex (0x10, 10h); of a string its text
         #[arg(allow_hyphen_values = true)]
         value: String,
@@ -127,6 +134,34 @@ pub(crate) enum Params {
         #[arg(long, value_enum, required = true, num_args = 1..)]
         layer: Vec<LayerName>,
     },
+}
+
+/// Types of numbers, named as those of SDO.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum TypeName {
+    Bool,
+    U8,
+    I8,
+    U16,
+    I16,
+    U32,
+    I32,
+    F32,
+}
+
+impl From<TypeName> for ParameterType {
+    fn from(name: TypeName) -> Self {
+        match name {
+            TypeName::Bool => Self::BOOL,
+            TypeName::U8 => Self::U8,
+            TypeName::I8 => Self::S8,
+            TypeName::U16 => Self::U16,
+            TypeName::I16 => Self::S16,
+            TypeName::U32 => Self::U32,
+            TypeName::I32 => Self::S32,
+            TypeName::F32 => Self::FLOAT,
+        }
+    }
 }
 
 #[derive(Debug, Clone, Copy, Args)]
@@ -420,10 +455,10 @@ pub(crate) enum Pvl {
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct SimLinmot {
-    /// CAN endpoint to be a node on
+    /// CAN endpoint to be a node on, or a name of the configuration
     #[arg(long, value_name = "EP", required_unless_present = "serial")]
     pub(crate) can: Option<String>,
-    /// Serial endpoint to answer LinRS on: pty:LINK, tcp:HOST:PORT or a serial port
+    /// Serial endpoint to answer LinRS on: pty:LINK, tcp:HOST:PORT, a serial port, or a name of the configuration
     #[arg(long, value_name = "EP", alias = "port", conflicts_with = "can")]
     pub(crate) serial: Option<String>,
     /// CANopen node ID, 1 to 127, 255 waits for one over LSS; or LinRS ID

@@ -8,7 +8,7 @@ use linmot::request::{List, Memory, Request, Value};
 use linmot::upid::{Layer, Upid, Usage};
 use serde_json::{Value as Json, json};
 
-use super::cli::{self, Drive, LayerName, Params};
+use super::cli::{self, Drive, LayerName, Params, TypeName};
 use super::connect::{AnyLink, connect};
 use super::text;
 use crate::cli::Global;
@@ -38,8 +38,10 @@ impl Shown {
 pub(super) fn run(out: &Output, global: &Global, command: &Params) -> Result<(), Exit> {
     match command {
         Params::List { drive, changed } => list(out, global, drive, *changed),
-        Params::Get { drive, upid, memory } => get(out, global, drive, *upid, *memory),
-        Params::Set { drive, upid, memory, value } => set(out, global, drive, *upid, *memory, value),
+        Params::Get { drive, upid, memory, kind } => get(out, global, drive, *upid, *memory, *kind),
+        Params::Set { drive, upid, memory, kind, value } => {
+            set(out, global, drive, *upid, *memory, *kind, value)
+        }
         Params::Defaults { drive, layer } => defaults(out, global, drive, layer),
     }
 }
@@ -153,13 +155,20 @@ fn print(shown: &Shown) {
     }
 }
 
-fn get(out: &Output, global: &Global, drive: &Drive, upid: Upid, memory: cli::Memory) -> Result<(), Exit> {
+fn get(
+    out: &Output,
+    global: &Global,
+    drive: &Drive,
+    upid: Upid,
+    memory: cli::Memory,
+    kind: Option<TypeName>,
+) -> Result<(), Exit> {
     let mut link = connect(global, drive)?;
     let usage = usage(&mut link, upid)?;
     let mut shown = read(&mut link, upid, usage, memory)?;
     let mut default = None;
     if shown.text.is_none() {
-        shown.range = Some(link.range(upid)?);
+        shown.range = Some(typed(link.range(upid)?, kind));
         default = Some(link.read(upid, Value::Default)?);
     }
     let mut json = to_json(&shown);
@@ -173,12 +182,18 @@ fn get(out: &Output, global: &Global, drive: &Drive, upid: Upid, memory: cli::Me
     out.document(json!({ "parameters": [json] }), || {
         print(&shown);
         if let (Some(range), Some(default)) = (shown.range, default) {
-            println!(
-                "minimum {}, maximum {}, default {} ({default:08X}h)",
-                range.minimum(),
-                range.maximum(),
-                range.number(default)
-            );
+            let words = |range: &Range| {
+                format!(
+                    "minimum {}, maximum {}, default {}",
+                    range.minimum(),
+                    range.maximum(),
+                    range.number(default)
+                )
+            };
+            println!("{} ({default:08X}h)", words(&range));
+            if let Some(other) = range.other() {
+                println!("or, which --type decides: {}", words(&other));
+            }
         }
     });
     Ok(())
@@ -190,6 +205,7 @@ fn set(
     drive: &Drive,
     upid: Upid,
     memory: cli::Memory,
+    kind: Option<TypeName>,
     value: &str,
 ) -> Result<(), Exit> {
     let mut link = connect(global, drive)?;
@@ -211,6 +227,7 @@ fn set(
         Wanted::Text(characters(value)?)
     } else {
         let range = link.range(upid).map_err(|fault| Exit::from(fault).context("nothing was written"))?;
+        let range = typed(range, kind);
         Wanted::Number(raw(upid, value, &range)?, range)
     };
     let said = match &value {
@@ -222,6 +239,7 @@ fn set(
         return Ok(());
     }
     out.confirm_on_terminal(global.yes, &format!("Write {said} to {upid} in {name}?"))?;
+    let mut told = None;
     match value {
         Wanted::Text(bytes) => {
             link.write_text(upid, memory, &bytes)
@@ -233,11 +251,17 @@ fn set(
                 Fault::ReadBack { .. } => Exit::check(fault.to_string()),
                 other => Exit::from(other).context("it was written, but could not be read back"),
             })?;
+            told = Some(range);
         }
     }
-    let shown = read(&mut link, upid, usage, BOTH)?;
+    let mut shown = read(&mut link, upid, usage, BOTH)?;
+    shown.range = told.or(shown.range);
     out.document(json!({ "parameters": [to_json(&shown)] }), || print(&shown));
     Ok(())
+}
+
+fn typed(range: Range, kind: Option<TypeName>) -> Range {
+    kind.map_or(range, |kind| range.with_type(kind.into()))
 }
 
 /// What shall be written.

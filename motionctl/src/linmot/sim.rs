@@ -17,13 +17,15 @@ use serde_json::json;
 use super::cli::SimLinmot;
 use super::connect::checksum;
 use crate::can::stop_flag;
+use crate::cli::Global;
+use crate::connect::{ChoiceOf, choose};
 use crate::exit::Exit;
 use crate::output::Output;
 
 /// The drive looks for the signal that stops it so often.
 const TURN: Duration = Duration::from_millis(50);
 
-pub(crate) fn run(out: &Output, arguments: &SimLinmot) -> Result<(), Exit> {
+pub(crate) fn run(out: &Output, global: &Global, arguments: &SimLinmot) -> Result<(), Exit> {
     let mut drive = VirtualDrive::new(generated(arguments.parameters), Times::default());
     // What a drive without motor data has logged by the time it is first used.
     drive.log_error(LoggedError { code: 0x01, hours: 0, milliseconds: 120 });
@@ -42,6 +44,7 @@ pub(crate) fn run(out: &Output, arguments: &SimLinmot) -> Result<(), Exit> {
     let mut keep = |drive: &VirtualDrive| state.as_mut().map_or(Ok(()), |state| state.keep(drive));
     let usage = |error: EndpointError| Exit::usage(error.to_string());
     if let Some(can) = &arguments.can {
+        let can = &choose(global, Some(can), ChoiceOf::Can)?;
         let endpoint: CanEndpoint = can.parse().map_err(usage)?;
         let node = crate::can::sim::address(arguments.node)?;
         let port = motion_io::can::open(&endpoint).map_err(|error| Exit::trouble(error.to_string()))?;
@@ -54,7 +57,7 @@ pub(crate) fn run(out: &Output, arguments: &SimLinmot) -> Result<(), Exit> {
         }
         return Ok(());
     }
-    let serial = arguments.serial.as_deref().unwrap_or_default();
+    let serial = &choose(global, arguments.serial.as_deref(), ChoiceOf::Port)?;
     let endpoint: Endpoint = serial.parse().map_err(usage)?;
     let mut port = open(&endpoint, Role::Device).map_err(|error| Exit::trouble(error.to_string()))?;
     let mut slave = Slave::new(arguments.node, checksum(arguments.checksum));

@@ -9,7 +9,7 @@ use std::thread::JoinHandle;
 use device_sim::can::Node;
 use device_sim::linmot::{CanDrive, Times, VirtualDrive, sg5};
 use linmot::code::Command;
-use linmot::drive::Drive;
+use linmot::drive::{Drive, Parameter};
 use linmot::linrs::{Checksum, Decoder, MAX_FRAME, Slave};
 use linmot::module::{Output, RPDO, TPDO};
 use linmot::request::Request;
@@ -21,6 +21,7 @@ use pdo::{Frame, NodeId, cob};
 use crate::common::Bench;
 
 /// What happens to a command and its answer.
+#[allow(dead_code)] // not in every test program
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Happens {
     Nothing,
@@ -53,11 +54,17 @@ pub(crate) struct Troubled {
 
 impl Troubled {
     /// On LINE, for `--can slcan:LINE` or for `--port LINE`.
+    #[allow(dead_code)] // not in every test program
     pub(crate) fn new(bench: &Bench, can: bool, script: Script) -> Self {
+        Self::with(bench, can, sg5(), script)
+    }
+
+    /// The same with other parameters.
+    pub(crate) fn with(bench: &Bench, can: bool, tree: Vec<Parameter>, script: Script) -> Self {
         let line = bench.path("LINE");
         let stop = Arc::new(AtomicBool::new(false));
         let stopped = stop.clone();
-        let drive = VirtualDrive::new(sg5(), TIMES);
+        let drive = VirtualDrive::new(tree, TIMES);
         let thread = if can {
             let port =
                 motion_io::can::open(&format!("slcan-pty:{}", line.display()).parse().unwrap()).unwrap();

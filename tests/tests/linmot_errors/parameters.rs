@@ -89,8 +89,8 @@ fn floats_and_ranges_below_zero_are_written_as_what_they_are() {
         for (upid, raw, words) in [
             (0x3010, bits(-100.5), "UPID 3010h: -100.5 is out of range, -100 to 100 expected"),
             (0x3010, bits(f32::NAN), "UPID 3010h: NaN is out of range, -100 to 100 expected"),
-            (0x3011, 0, "UPID 3011h: 0 is out of range, -100 to -1 expected"),
-            (0x3011, 0xFF00, "UPID 3011h: -256 is out of range, -100 to -1 expected"),
+            (0x3011, 0, "UPID 3011h: 0 is out of range, -100 to -1, or 65436 to 65535, expected"),
+            (0x3011, 0xFF00, "UPID 3011h: -256 is out of range, -100 to -1, or 65436 to 65535, expected"),
         ] {
             let fault = bench.link.write(Upid(upid), Memory::Rom, raw).unwrap_err();
             assert_eq!(fault.to_string(), words, "{carrier:?}");

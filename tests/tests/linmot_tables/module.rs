@@ -140,7 +140,7 @@ fn parameters(bench: &mut Bench) {
             List::All => bench.says(Request::NextItem(list), 0x21, [0; 3], 0x00, [0x03F2, 0x0000, 0x08]),
             // UPID found, its value.
             List::Modified => {
-                bench.says(Request::NextItem(list), 0x23, [0; 3], 0x00, [0x03F3, 0x2058, 0x7841])
+                bench.says(Request::NextItem(list), 0x23, [0; 3], 0x00, [0x03F3, 0x2058, 0x7841]);
             }
         }
         let from = Upid(0x3F00);

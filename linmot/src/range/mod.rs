@@ -1,6 +1,11 @@
 //! The values that a parameter takes, as its drive tells them.
 
+mod digits;
+
 use core::fmt;
+
+use crate::code::ParameterType;
+use digits::{digits_of_floats, digits_of_signed, digits_of_unsigned, unused};
 
 /// What a raw value means.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -39,110 +44,77 @@ enum Reading {
 ///
 /// Every command carries 32 bits, and the drive filters out those that do not belong to the
 /// parameter's type (manual B 2.5): a value that is too wide would be kept cut off, with status 00h.
-/// No command of manual B tells the type. The bounds tell what of it matters (project-defined):
-/// - They are read as unsigned, as signed with the minimum's 8, 16 or 32 bits, and as float, as far as the minimum is below
-///   the maximum then. Of these readings that one counts whose bounds have the fewest digits in decimal, as
-///   people choose them; a type's own bound has none. Where readings are equal, the first of the list counts.
+/// No command of manual B tells the type. Who knows it makes the range with [`of`](Self::of); otherwise the
+/// bounds tell what of it matters (project-defined):
+/// - They are read as unsigned, as signed with the minimum's 8, 16 or 32 bits, and as float, as far as the
+///   minimum is below the maximum then. Of these readings that one counts whose bounds have the fewest digits
+///   in decimal, as people choose them; a type's own bound has none, and bounds that differ in their sign only
+///   count once. Where readings are equal, the first of the list counts.
+/// - Bounds that both have the sign bit may be signed or not: signed counts only if it has 2 digits less. A
+///   number is taken in either way then, see [`other`](Self::other).
 /// - Where the bounds are equal, the drive tells no range, and every 32-bit value lies in it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Range {
     minimum: u32,
     maximum: u32,
     reading: Reading,
-}
-
-/// Digits of an integer without the zeros at its end.
-const fn digits(number: i64) -> u32 {
-    let mut rest = number.unsigned_abs();
-    if rest == 0 {
-        return 0;
-    }
-    while rest.is_multiple_of(10) {
-        rest /= 10;
-    }
-    let mut count = 0;
-    while rest > 0 {
-        rest /= 10;
-        count += 1;
-    }
-    count
-}
-
-/// Digits of a single; `None` where it is none that anybody would choose: not a number, infinite, with more
-/// than 4 digits, or a magnitude that no quantity has.
-fn digits_of_float(bits: u32) -> Option<u32> {
-    let value = f32::from_bits(bits);
-    let magnitude = if value < 0.0 { -value } else { value };
-    if magnitude == 0.0 || magnitude == f32::MAX {
-        return Some(0);
-    }
-    // NaN is in no range.
-    if !(1e-9..1e12).contains(&magnitude) {
-        return None;
-    }
-    let mut scaled = f64::from(magnitude);
-    while scaled >= 10.0 {
-        scaled /= 10.0;
-    }
-    while scaled < 1.0 {
-        scaled *= 10.0;
-    }
-    (1..=4).find(|_| {
-        let whole = (scaled + 0.5) as u32;
-        let distance = scaled - f64::from(whole);
-        // A single has 24 bits.
-        let close = distance < scaled * 6e-8 && -distance < scaled * 6e-8;
-        scaled *= 10.0;
-        close
-    })
-}
-
-/// Bits above the sign bit, by a minimum that is negative: it comes as wide as its type.
-const fn unused(minimum: u32) -> u32 {
-    match minimum {
-        0..=0xFF => 24,
-        0x100..=0xFFFF => 16,
-        _ => 0,
-    }
-}
-
-/// Digits of both bounds read as signed; `None` where they cannot be.
-fn digits_of_signed(minimum: u32, maximum: u32) -> Option<u32> {
-    let unused = unused(minimum);
-    let number = |raw: u32| ((raw << unused) as i32) >> unused;
-    let (low, high) = (number(minimum), number(maximum));
-    let own = |number: i32| {
-        let end = i32::MAX >> unused;
-        if number == end || number == -end - 1 { 0 } else { digits(number.into()) }
-    };
-    // Both bounds positive are as well unsigned.
-    let wide = maximum << unused >> unused == maximum;
-    (low < 0 && low < high && wide).then(|| own(low) + own(high))
+    /// Signed and unsigned are both possible; bits above the sign bit.
+    either: Option<u32>,
 }
 
 impl Range {
-    /// From the raw values.
+    /// From the raw values alone.
     #[must_use]
     pub fn new(minimum: u32, maximum: u32) -> Self {
-        let own = |bound: u32| match bound {
-            0xFF | 0xFFFF | u32::MAX => 0,
-            other => digits(other.into()),
+        let unsigned = digits_of_unsigned(minimum, maximum);
+        let signed = digits_of_signed(minimum, maximum);
+        let unused = unused(minimum);
+        let (whole, either) = match (unsigned, signed) {
+            (Some(unsigned), Some(signed)) if signed + 2 <= unsigned => {
+                (Some((Reading::Signed(unused), signed)), Some(unused))
+            }
+            (Some(unsigned), Some(_)) => (Some((Reading::Unsigned, unsigned)), Some(unused)),
+            (Some(unsigned), None) => (Some((Reading::Unsigned, unsigned)), None),
+            (None, Some(signed)) => (Some((Reading::Signed(unused), signed)), None),
+            (None, None) => (None, None),
         };
-        let unsigned = (minimum < maximum).then(|| own(minimum) + own(maximum));
-        let float = || {
-            let below = f32::from_bits(minimum) < f32::from_bits(maximum);
-            let digits = digits_of_float(minimum)? + digits_of_float(maximum)?;
-            below.then_some(digits)
+        let (reading, either) = match (whole, digits_of_floats(minimum, maximum)) {
+            (Some((_, whole)), Some(float)) if float < whole => (Reading::Float, None),
+            (None, Some(_)) => (Reading::Float, None),
+            (Some((reading, _)), _) => (reading, either),
+            (None, None) => (Reading::Unsigned, None),
         };
-        let readings = [
-            (Reading::Unsigned, unsigned),
-            (Reading::Signed(unused(minimum)), digits_of_signed(minimum, maximum)),
-            (Reading::Float, float()),
-        ];
-        let possible = readings.into_iter().filter_map(|(reading, digits)| Some((reading, digits?)));
-        let best = possible.min_by_key(|(_, digits)| *digits);
-        let reading = best.map_or(Reading::Unsigned, |(reading, _)| reading);
-        Self { minimum, maximum, reading }
+        Self { minimum, maximum, reading, either }
+    }
+
+    /// Of a parameter whose type is known.
+    #[must_use]
+    pub const fn of(kind: ParameterType, minimum: u32, maximum: u32) -> Self {
+        let reading = match kind {
+            ParameterType::S8 => Reading::Signed(24),
+            ParameterType::S16 => Reading::Signed(16),
+            ParameterType::S32 => Reading::Signed(0),
+            ParameterType::FLOAT => Reading::Float,
+            _ => Reading::Unsigned,
+        };
+        Self { minimum, maximum, reading, either: None }
+    }
+
+    /// The same bounds, of a parameter whose type is known.
+    #[must_use]
+    pub const fn with_type(&self, kind: ParameterType) -> Self {
+        Self::of(kind, self.minimum, self.maximum)
+    }
+
+    /// The same bounds in the other reading, where they may as well be signed as unsigned.
+    #[must_use]
+    pub const fn other(&self) -> Option<Self> {
+        let Some(unused) = self.either else { return None };
+        let reading = match self.reading {
+            Reading::Unsigned => Reading::Signed(unused),
+            _ => Reading::Unsigned,
+        };
+        Some(Self { reading, either: None, ..*self })
     }
 
     /// Whether the drive tells a range at all.
@@ -180,13 +152,16 @@ impl Range {
     }
 
     const fn integer(&self, raw: u32) -> i64 {
-        if let Reading::Signed(unused) = self.reading {
-            let extended = ((raw << unused) as i32) >> unused;
-            if extended as u32 == raw || raw << unused >> unused == raw {
-                return extended as i64;
-            }
+        let (signed, unused) = match (self.reading, self.either) {
+            (Reading::Signed(unused), _) => (true, unused),
+            (_, Some(unused)) => (false, unused),
+            _ => return raw as i64,
+        };
+        let (extended, cut) = (((raw << unused) as i32) >> unused, raw << unused >> unused);
+        if extended as u32 != raw && cut != raw {
+            return raw as i64;
         }
-        raw as i64
+        if signed { extended as i64 } else { cut as i64 }
     }
 
     /// Whether a raw value lies between the bounds and is no wider than the type.
@@ -205,25 +180,30 @@ impl Range {
     /// The raw value of a whole number; `None` outside of the bounds, and of a float that has no such value.
     #[must_use]
     pub fn raw(&self, number: i64) -> Option<u32> {
-        if !self.is_told() {
-            return (i64::from(i32::MIN)..=i64::from(u32::MAX)).contains(&number).then_some(number as u32);
-        }
         if self.is_float() {
             let value = number as f32;
             return (value as i64 == number).then(|| value.to_bits()).filter(|raw| self.contains(*raw));
         }
-        let within = (self.integer(self.minimum)..=self.integer(self.maximum)).contains(&number);
+        if !self.is_told() {
+            return (i64::from(i32::MIN)..=i64::from(u32::MAX)).contains(&number).then_some(number as u32);
+        }
+        if !(self.integer(self.minimum)..=self.integer(self.maximum)).contains(&number) {
+            return self.other()?.raw(number);
+        }
         let unused = if let Reading::Signed(unused) = self.reading { unused } else { 0 };
-        within.then_some((number as u32) << unused >> unused)
+        Some((number as u32) << unused >> unused)
     }
 }
 
 impl fmt::Display for Range {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if self.is_told() {
-            write!(f, "{} to {}", self.minimum(), self.maximum())
-        } else {
-            f.write_str("32 bits")
+        if !self.is_told() {
+            return f.write_str("32 bits");
+        }
+        write!(f, "{} to {}", self.minimum(), self.maximum())?;
+        match self.other() {
+            Some(other) => write!(f, ", or {} to {},", other.minimum(), other.maximum()),
+            None => Ok(()),
         }
     }
 }
@@ -231,7 +211,6 @@ impl fmt::Display for Range {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::code::ParameterType;
     use proptest::prelude::*;
     use std::string::ToString;
 
@@ -315,31 +294,105 @@ mod tests {
         }
     }
 
-    /// Minimum and maximum of the same sign look like unsigned numbers.
+    /// Minimum and maximum of the same sign look like unsigned numbers, and unsigned ones like them.
     #[test]
-    fn ranges_below_zero_are_negative() {
-        for (low, high, words) in [
-            (0x9C, 0xFF, "-100 to -1"),
-            (0xFF9C, 0xFFFF, "-100 to -1"),
-            (0xFFFF_FF9C, 0xFFFF_FFFF, "-100 to -1"),
-            (0x80, 0xFF, "-128 to -1"),
-            (0xEC78, 0xFFFD, "-5000 to -3"),
-            (0x8000_0000, 0xFFFF_FFF6, "-2147483648 to -10"),
-            // As these do, and are.
-            (200, 255, "200 to 255"),
-            (40_000, 50_000, "40000 to 50000"),
-            (3_000_000_000, 4_000_000_000, "3000000000 to 4000000000"),
+    fn bounds_that_both_have_the_sign_bit_are_read_in_either_way() {
+        for (low, high, words, number, raw) in [
+            (0x9C, 0xFF, "-100 to -1, or 156 to 255,", -5, 0xFB),
+            (0xFF9C, 0xFFFF, "-100 to -1, or 65436 to 65535,", -5, 0xFFFB),
+            (0xFFFF_FF9C, 0xFFFF_FFFF, "-100 to -1, or 4294967196 to 4294967295,", -5, 0xFFFF_FFFB),
+            (0xEC78, 0xFFFD, "-5000 to -3, or 60536 to 65533,", -4000, 0xF060),
+            (0x8000_0000, 0xFFFF_FFF6, "-2147483648 to -10, or 2147483648 to 4294967286,", -11, 0xFFFF_FFF5),
+            (128, 200, "128 to 200, or -128 to -56,", 150, 150),
+            (128, 250, "128 to 250, or -128 to -6,", 150, 150),
+            (150, 250, "150 to 250, or -106 to -6,", 200, 200),
+            (200, 255, "200 to 255, or -56 to -1,", 250, 250),
+            (0x80, 0xFF, "128 to 255, or -128 to -1,", 150, 150),
+            (32_768, 50_000, "32768 to 50000, or -32768 to -15536,", 40_000, 40_000),
+            (40_000, 50_000, "40000 to 50000, or -25536 to -15536,", 45_000, 45_000),
+            (40_000, 65_535, "40000 to 65535, or -25536 to -1,", 45_000, 45_000),
+            (
+                3_000_000_000,
+                4_000_000_000,
+                "3000000000 to 4000000000, or -1294967296 to -294967296,",
+                3_500_000_000,
+                3_500_000_000,
+            ),
+            (
+                1 << 31,
+                u32::MAX,
+                "2147483648 to 4294967295, or -2147483648 to -1,",
+                3_000_000_000,
+                3_000_000_000,
+            ),
         ] {
             let range = Range::new(low, high);
             assert_eq!(range.to_string(), words);
             assert!(range.contains(low) && range.contains(high) && !range.contains(0), "{words}");
+            assert_eq!((range.raw(number), range.number(raw)), (Some(raw), Number::Integer(number)));
+            // The same value, as the other reading has it.
+            let Number::Integer(other) = range.other().unwrap().number(raw) else { panic!() };
+            assert_eq!((range.raw(other), range.raw(0)), (Some(raw), None), "{words}");
+            assert!(other.signum() == -number.signum());
         }
         let s16 = Range::new(0xFF9C, 0xFFFF);
-        assert_eq!([-5, -101, 0, 65_531].map(|n| s16.raw(n)), [Some(0xFFFB), None, None, None]);
+        assert_eq!([-5, -101, 0, 65_531].map(|n| s16.raw(n)), [Some(0xFFFB), None, None, Some(0xFFFB)]);
         assert!(s16.contains(0xFFFF_FFFB) && !s16.contains(0x1_FFFB));
+        // A minimum that is not negative in any way, or a maximum of the lower half: one reading.
+        for (low, high, words) in [(100, 200, "100 to 200"), (0x9C, 100, "-100 to 100"), (0, 255, "0 to 255")]
+        {
+            assert_eq!(
+                (Range::new(low, high).to_string().as_str(), Range::new(low, high).other()),
+                (words, None)
+            );
+        }
         // As wide as the minimum comes, however small the numbers are.
         let s32 = Range::new(-100i32 as u32, 100);
         assert_eq!((s32.raw(-5), s32.contains(0xFB)), (Some(-5i32 as u32), false));
+    }
+
+    /// A type that is known leaves nothing open.
+    #[test]
+    fn a_known_type_is_taken_at_its_word() {
+        let of = |kind, low, high| Range::of(kind, low, high).to_string();
+        assert_eq!(of(ParameterType::U8, 0x9C, 0xFF), "156 to 255");
+        assert_eq!(of(ParameterType::S8, 128, 200), "-128 to -56");
+        assert_eq!(of(ParameterType::S16, 40_000, 50_000), "-25536 to -15536");
+        assert_eq!(of(ParameterType::U32, 0x3F80_0000, 0x4000_0000), "1065353216 to 1073741824");
+        assert_eq!(of(ParameterType::FLOAT, 0, 1_234_567_890), "0 to 1228890.3");
+        assert_eq!(Range::of(ParameterType::S8, 128, 200).raw(150), None);
+        assert_eq!(Range::of(ParameterType::FLOAT, 7, 7).raw(5), Some(5f32.to_bits()));
+    }
+
+    /// Bounds that nobody would type, but that quantities have.
+    #[test]
+    fn floats_of_many_digits_are_floats() {
+        use core::f32::consts::{FRAC_PI_2, PI, TAU};
+        for (low, high) in [
+            (-PI, PI),
+            (-2.7654, 2.7654),
+            (-PI, TAU),
+            (0.0, PI),
+            (-FRAC_PI_2, 0.0),
+            (-1.0 / 3.0, 1.0 / 3.0),
+            (-273.15, 1000.0),
+            (-0.12345, -0.001),
+        ] {
+            let range = Range::new(low.to_bits(), high.to_bits());
+            assert_eq!((range.is_float(), range.to_string()), (true, std::format!("{low} to {high}")));
+            assert!(
+                range.contains(((low + high) / 2.0).to_bits()) && !range.contains((high + 0.1).to_bits())
+            );
+        }
+        for (low, high) in [
+            (0, 1_234_567_890),
+            (-1_234_567_890, 1_234_567_890),
+            (0, (1 << 30) - 1),
+            (-(1 << 30), (1 << 30) - 1),
+            (-1_000_000_001, 1_000_000_001),
+        ] {
+            assert_eq!(Range::new(low as u32, high as u32).to_string(), std::format!("{low} to {high}"));
+        }
     }
 
     proptest! {
