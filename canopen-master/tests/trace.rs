@@ -199,17 +199,21 @@ fn a_block_upload_answered_as_a_plain_one() {
 }
 
 #[test]
-fn segments_missing_in_the_capture_make_a_transfer_incomplete() {
+fn segments_missing_in_the_capture_make_a_transfer_incomplete_and_end_its_data() {
     let ended = Script::new().play(&[
         "601#C200200115000000",
         "581#A000200104000000",
         "601#0131323334353637",
         "601#8341424344454647",
         "581#A203040000000000",
+        "601#0151525354555657",
+        "601#8261626364656667",
+        "581#A202040000000000",
         "601#C100000000000000",
         "581#A100000000000000",
     ]);
-    assert_eq!((ended.len(), ended[0].outcome), (1, Outcome::Incomplete));
+    assert_eq!((ended.len(), ended[0].outcome, ended[0].lacking), (1, Outcome::Incomplete, true));
+    assert_eq!((&ended[0].data[..], ended[0].size), (&b"1234567"[..], 7));
 }
 
 #[test]

@@ -445,3 +445,15 @@ fn an_error_report_has_no_identifier_of_29_bits() {
     expect(line, &[(None, Some("can0"), None, content)]);
     assert_eq!(Frame::new(4, true, FrameKind::Error, &[]), Frame::new(4, false, FrameKind::Error, &[]));
 }
+
+/// `0080` behind six bytes was taken for nothing, and a frame of six bytes for the frame.
+#[test]
+fn what_stands_behind_the_data_of_a_log_line_is_told() {
+    let (_, frames, damage) =
+        read(b"(1.4) can0 605#230018018501 0080\n(1.5) can0 701#00 T\n(1.6) can0 701#05 # started\n");
+    assert_eq!(frames.len(), 2);
+    assert_eq!(
+        damage,
+        ["line 1: R, T or nothing expected behind the data: \"(1.4) can0 605#230018018501 0080\""]
+    );
+}

@@ -350,5 +350,19 @@ fn ports_and_pages() {
     for shell in ["bash", "elvish", "fish", "powershell", "zsh"] {
         let script = run(&["completions", shell]);
         assert!(String::from_utf8_lossy(&script.stdout).contains("monitor"), "{shell}");
+
+/// The program ended before the frame that ends a block upload had gone out.
+#[test]
+fn a_block_upload_is_ended_on_the_wire() {
+    let mut bench = Bench::new();
+    bench.sim(&["io", "--node", "5"]);
+    let mut ear = motion_io::can::open(&bench.endpoint.parse().unwrap()).unwrap();
+    assert_eq!(bench.can(&["sdo", "read", "5", "0x100A", "--block"], 0)["mode"], "block");
+    loop {
+        let event = ear.receive(std::time::Duration::from_secs(10)).unwrap();
+        let Some(motion_io::can::Event::Frame(frame)) = event else { panic!("no end: {event:?}") };
+        if frame.standard_id() == Some(0x605) && frame.data().first() == Some(&0xA1) {
+            break;
+        }
     }
 }

@@ -88,6 +88,12 @@ impl Driver {
         self.port.now().saturating_sub(self.start)
     }
 
+    /// Whether a frame waits for room in the endpoint's transmit queue.
+    #[must_use]
+    pub const fn is_blocked(&self) -> bool {
+        self.held.is_some()
+    }
+
     /// Sends what the engine has to send, then waits for frames until the engine's next timeout, at most
     /// until `limit` on the engine's clock. Frames that the endpoint's queue does not take wait, in order.
     /// `observe` sees everything that came and, as [`Event::Frame`] with `true`, everything that was sent.

@@ -163,8 +163,7 @@ fn log_frame(word: &[u8], hash: usize, tail: &[u8], record: &mut Record) -> Pars
             None => return Parsed::Damaged(TOO_MUCH),
         },
     }
-    record.direction = direction(tail);
-    Parsed::Frame
+    behind(tail, record)
 }
 
 /// `123#11.22.3344`, as people type it.
@@ -180,16 +179,21 @@ fn dotted(text: &[u8], record: &mut Record, tail: &[u8]) -> Parsed {
         Some(len) => record.frame.len = len as u8,
         None => return Parsed::Damaged(TOO_MUCH),
     }
-    record.direction = direction(tail);
-    Parsed::Frame
+    behind(tail, record)
 }
 
-fn direction(text: &[u8]) -> Option<Direction> {
-    match text.trim_ascii() {
-        [] => None,
-        [b'R', ..] => Some(Direction::Rx),
-        [b'T', ..] => Some(Direction::Tx),
-        _ => None,
+/// What stands behind the data: nothing, the direction as `R` or `T`, a comment.
+fn behind(text: &[u8], record: &mut Record) -> Parsed {
+    let (way, rest) = word(text).unwrap_or((b"", b""));
+    let (direction, rest) = match way {
+        b"R" | b"Rx" | b"RX" => (Some(Direction::Rx), rest),
+        b"T" | b"Tx" | b"TX" => (Some(Direction::Tx), rest),
+        _ => (None, text),
+    };
+    record.direction = direction;
+    match rest.trim_ascii() {
+        [] | [b'#' | b';', ..] | [b'/', b'/', ..] => Parsed::Frame,
+        _ => Parsed::Damaged("R, T or nothing expected behind the data"),
     }
 }
 

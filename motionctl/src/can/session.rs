@@ -22,7 +22,7 @@ const PEER: Duration = Duration::from_secs(10);
 /// Time for each step of fastscan, unless `--timeout` says otherwise: adapters and servers hold answers
 /// back for some milliseconds.
 const FASTSCAN_STEP: Duration = Duration::from_millis(25);
-/// Frames that are still to go out when a command is done have so long.
+/// Frames that are still to go out when a command is done wait so long for room in the transmit queue.
 const FLUSH: Duration = Duration::from_millis(20);
 
 type AnyMaster = Master<'static, Vec<u8>, 127>;
@@ -262,10 +262,14 @@ impl Session {
         }
     }
 
-    /// Lets out what is still to be sent, such as an abort.
+    /// Lets out what is still to be sent, such as an abort or the end of a block upload.
     pub(crate) fn flush(&mut self) -> Result<(), Exit> {
         let limit = self.now() + FLUSH;
-        self.wait(limit, |_| None::<()>).map(|_| ())
+        self.step(self.now())?;
+        while self.driver.is_blocked() && self.now() < limit {
+            self.step(limit)?;
+        }
+        Ok(())
     }
 
     fn transfer(
@@ -281,14 +285,12 @@ impl Session {
             _ => None,
         })?;
         self.watched = None;
+        self.flush()?;
         let Some(finished) = finished else { return Err(Exit::trouble("the transfer has no outcome")) };
-        match finished.outcome {
-            Outcome::Done(_) => Ok(Ok(finished.buffer)),
-            outcome => {
-                self.flush()?;
-                Ok(Err(TransferError { node: node.raw(), at, outcome }))
-            }
-        }
+        Ok(match finished.outcome {
+            Outcome::Done(_) => Ok(finished.buffer),
+            outcome => Err(TransferError { node: node.raw(), at, outcome }),
+        })
     }
 
     fn options(&self, block: bool) -> Options {

@@ -121,6 +121,8 @@ pub struct Transfer {
     /// Its beginning was not heard: the first frame of its channel was one from inside it. Its data and
     /// its size are those from there on.
     pub late: bool,
+    /// The capture lacks segments of it: its data and its size are those before the first of them.
+    pub lacking: bool,
     /// What was transferred, the first [`MAX_KEPT`] bytes of it.
     pub data: Vec<u8>,
     /// Bytes transferred.
@@ -171,8 +173,6 @@ struct Open {
     next: u8,
     /// Sequence number of the last segment of all, once seen.
     last: Option<u8>,
-    /// Segments are missing in the capture.
-    holes: bool,
 }
 
 impl Open {
@@ -190,6 +190,7 @@ impl Open {
             mode,
             at,
             late: false,
+            lacking: false,
             data: Vec::new(),
             size: 0,
             outcome: Outcome::Incomplete,
@@ -197,10 +198,13 @@ impl Open {
             began: now,
             ended: now,
         };
-        Self { transfer, phase, confirmed: 0, next: 1, last: None, holes: false }
+        Self { transfer, phase, confirmed: 0, next: 1, last: None }
     }
 
     fn push(&mut self, bytes: &[u8]) {
+        if self.transfer.lacking {
+            return;
+        }
         let room = MAX_KEPT.saturating_sub(self.transfer.data.len()).min(bytes.len());
         self.transfer.data.extend_from_slice(bytes.get(..room).unwrap_or(&[]));
         self.transfer.size = self.transfer.size.saturating_add(bytes.len() as u64);
@@ -236,7 +240,7 @@ impl Open {
     /// The receiver has the segments up to `sequence`; what came behind them comes again.
     fn acknowledge(&mut self, sequence: u8) {
         if sequence >= self.next {
-            self.holes = true;
+            self.transfer.lacking = true;
         }
         self.truncate(self.confirmed + u64::from(sequence) * SEGMENT as u64);
         let last = self.last == Some(sequence);
@@ -247,7 +251,9 @@ impl Open {
     }
 
     fn end_of_blocks(&mut self, unused: u8) {
-        self.truncate(self.transfer.size.saturating_sub(u64::from(unused)));
+        if !self.transfer.lacking {
+            self.truncate(self.transfer.size.saturating_sub(u64::from(unused)));
+        }
         self.phase = Phase::BlockEnding;
     }
 }
@@ -334,8 +340,8 @@ impl Watch {
 
     fn end(&mut self, outcome: Outcome, events: &mut VecDeque<Transfer>) {
         if let Some(open) = self.open.take() {
-            let holes = open.holes && outcome == Outcome::Done;
-            let outcome = if holes { Outcome::Incomplete } else { outcome };
+            let lacking = open.transfer.lacking && outcome == Outcome::Done;
+            let outcome = if lacking { Outcome::Incomplete } else { outcome };
             events.push_back(Transfer { outcome, ..open.transfer });
         }
     }

@@ -7,6 +7,7 @@ mod text;
 
 use std::io::{self, Write};
 
+use canopen_master::Address;
 use canopen_master::trace::{Direction as TransferDirection, Kind, Mode, Outcome, Tracer, Transfer};
 use motion_io::capture::{FrameKind, Record, Time};
 
@@ -179,10 +180,20 @@ impl Teller for Json<'_> {
                 Mode::Block => "block",
             },
         );
+        // Of a transfer that began before the capture nothing may tell the object.
+        let named = !(transfer.late && transfer.at == Address::new(0, 0));
         key!(out, "index");
-        put_number(out, transfer.at.index);
+        if named {
+            put_number(out, transfer.at.index)
+        } else {
+            out.extend_from_slice(b"null")
+        }
         key!(out, "subindex");
-        put_number(out, transfer.at.sub);
+        if named {
+            put_number(out, transfer.at.sub)
+        } else {
+            out.extend_from_slice(b"null")
+        }
         key!(out, "size");
         put_number(out, transfer.size);
         key!(out, "data");
@@ -191,6 +202,9 @@ impl Teller for Json<'_> {
         out.push(b'"');
         if transfer.data.len() as u64 != transfer.size {
             out.extend_from_slice(b",\"truncated\":true");
+        }
+        if transfer.lacking {
+            out.extend_from_slice(b",\"lacking\":true");
         }
         key!(out, "outcome");
         put_word(

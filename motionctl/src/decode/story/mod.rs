@@ -41,6 +41,8 @@ pub(crate) struct Story<'a> {
     /// Whether a bus has to be named.
     buses: Vec<String>,
     last_time: Option<i64>,
+    /// Time of the line told last.
+    latest: Option<i64>,
     cycles: BTreeMap<Cycle, Count>,
     objects: BTreeMap<(u16, NodeId, Address, bool), Told>,
     drives: BTreeMap<(u16, NodeId), ds402::State>,
@@ -73,6 +75,7 @@ impl<'a> Story<'a> {
             start: None,
             buses: Vec::new(),
             last_time: None,
+            latest: None,
             cycles: BTreeMap::new(),
             objects: BTreeMap::new(),
             drives: BTreeMap::new(),
@@ -113,6 +116,7 @@ impl<'a> Story<'a> {
             return;
         }
         self.repeated();
+        self.latest = time.or(self.latest);
         let _ = writeln!(self.out, "{:>12}  {text}", self.clock(time));
         self.last.text = text;
     }
@@ -126,7 +130,8 @@ impl<'a> Story<'a> {
     fn repeated(&mut self) {
         let again = core::mem::take(&mut self.last.again);
         if again > 0 {
-            let _ = writeln!(self.out, "{:>12}  … the same {again} times more", "");
+            let times = if again == 1 { "once".into() } else { format!("{again} times") };
+            let _ = writeln!(self.out, "{:>12}  … the same {times} more", "");
         }
     }
 
@@ -299,7 +304,11 @@ impl Teller for Story<'_> {
         }
         match *kind {
             Kind::Nmt { command, target } => {
-                let whom = if target == 0 { "all nodes".into() } else { format!("node {target}") };
+                let whom = match target {
+                    0 => "all nodes".into(),
+                    1..=127 => format!("node {target}"),
+                    _ => format!("node {target}, which is no node ID"),
+                };
                 let what = command.map_or_else(|| "an unknown command".into(), |command| command.to_string());
                 self.say(time, bus, "master", &format!("tells {whom}: {what}"));
             }

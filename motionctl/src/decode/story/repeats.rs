@@ -87,7 +87,8 @@ impl Story<'_> {
     /// The counts, when the capture has ended.
     pub(in super::super) fn end(&mut self, tracer: &Tracer) {
         self.repeated();
-        if self.cycles.values().any(|count| count.rhythm.number > 1) {
+        let again: u64 = self.objects.values().map(|told| told.again).sum();
+        if again > 0 || self.cycles.values().any(|count| count.rhythm.number > 1) {
             let _ = writeln!(self.out, "\nwhat repeated itself:");
         }
         let cycles = core::mem::take(&mut self.cycles);
@@ -112,9 +113,8 @@ impl Story<'_> {
             };
             let _ = writeln!(self.out, "  {bus}{what}: {} times{period}{changes}", count.rhythm.number);
         }
-        let again: u64 = self.objects.values().map(|told| told.again).sum();
         if again > 0 {
-            let _ = writeln!(self.out, "  SDO transfers with no news: {again}");
+            let _ = writeln!(self.out, "  SDO transfers like those told: {again}");
         }
     }
 }

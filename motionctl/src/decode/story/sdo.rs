@@ -95,10 +95,20 @@ impl Story<'_> {
             Outcome::Incomplete if transfer.frames == 1 && !transfer.late => {
                 format!("{verb:<5} {object}: NO ANSWER")
             }
+            Outcome::Incomplete if transfer.lacking => {
+                format!("{verb:<5} {object}: frames are missing in the capture behind {value}{how}")
+            }
             Outcome::Incomplete => format!("{verb:<5} {object}: unfinished, {value}{how}"),
         };
-        let time = transfer.ended.and_then(|time| i64::try_from(time.as_nanos()).ok());
-        self.say(time, bus, &who(node), &format!("{what}{remark}{more}"));
+        let ended = transfer.ended.and_then(|time| i64::try_from(time.as_nanos()).ok());
+        // That nothing more came shows later, and is told where it shows.
+        let (time, since) = match self.latest.filter(|latest| ended.is_some_and(|ended| ended < *latest)) {
+            Some(latest) => {
+                (self.last_time.max(Some(latest)), format!(", last heard at {}", self.clock(ended)))
+            }
+            None => (ended, String::new()),
+        };
+        self.say(time, bus, &who(node), &format!("{what}{since}{remark}{more}"));
     }
 }
 
