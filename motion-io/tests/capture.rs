@@ -457,3 +457,83 @@ fn what_stands_behind_the_data_of_a_log_line_is_told() {
         ["line 1: R, T or nothing expected behind the data: \"(1.4) can0 605#230018018501 0080\""]
     );
 }
+
+/// Each of these lines was taken for nothing, or for the first of its frames.
+#[test]
+fn frames_are_not_lost_among_what_looks_like_something_else() {
+    let lost = |content: &[u8]| {
+        let (_, frames, damage) = read(content);
+        (frames.len(), damage.len())
+    };
+    assert_eq!(lost(b"(1.0) can0 701#00\r(2.0) can0 702#00\r(3.0) can0 703#00\n(4.0) can0 704#00\n"), (1, 1));
+    assert_eq!(
+        lost(b"base hex timestamps absolute\n 0.1 1 701 Rx d 1 00\r 0.2 1 702 Rx d 1 00\r\n 0.3 1 703 Rx d 1 00\r\n"),
+        (1, 1)
+    );
+    // Behind an error report a line that begins with a tab explains it, unless it is a frame.
+    assert_eq!(lost(b"(1.0) can0 20000004#0000000000000000\n\tbus-off\n(3.0) can0 702#00\n"), (2, 0));
+    assert_eq!(
+        lost(b"(1.0) can0 20000004#0000000000000000\n\t(2.0) can0 701#00\n(3.0) can0 702#00\n"),
+        (3, 0)
+    );
+    // Buses with names that a preamble could begin with.
+    assert_eq!(lost(b"CAN1  701 Rx SD  1  00\nBus2  702 Rx SD  1  00\nController3 703 Rx SD 1 00\n"), (3, 0));
+}
+
+/// A block of a pcapng file, little endian.
+fn block(kind: u32, body: &[u8]) -> Vec<u8> {
+    let total = (12 + body.len() as u32).to_le_bytes();
+    [&kind.to_le_bytes()[..], &total, body, &total].concat()
+}
+
+/// An interface of link type 227 with options, each of a code and up to 4 bytes.
+fn interface(options: &[(u16, &[u8])]) -> Vec<u8> {
+    let mut body = vec![227, 0, 0, 0, 0, 0, 0, 0];
+    for (code, value) in options {
+        body.extend_from_slice(&code.to_le_bytes());
+        body.extend_from_slice(&(value.len() as u16).to_le_bytes());
+        body.extend_from_slice(value);
+        body.resize(body.len().next_multiple_of(4), 0);
+    }
+    block(1, &body)
+}
+
+/// A packet block with one byte of identifier `id`.
+fn packet(kind: u32, interface: u32, id: u8) -> Vec<u8> {
+    let frame = [0, 0, 0, id, 1, 0, 0, 0, 0xAA, 0, 0, 0];
+    let words = [interface, 0, 1_000_000, 9, 9];
+    let head: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+    block(kind, &[&head[..], &frame].concat())
+}
+
+/// Frames of the obsolete packet block were skipped; an interface with an odd resolution gave its number to
+/// the next one; interfaces without a name were one bus.
+#[test]
+fn interfaces_of_pcapng_are_told_apart_whatever_they_lack() {
+    let section =
+        block(0x0A0D_0D0A, &[&0x1A2B_3C4D_u32.to_le_bytes()[..], &[1, 0, 0, 0], &[0xFF; 8]].concat());
+    let file = [
+        section,
+        interface(&[(2, b"canA"), (9, &[0xC0])]),
+        interface(&[(2, b"canB")]),
+        interface(&[]),
+        packet(6, 1, 1),
+        packet(2, 0, 2),
+        packet(6, 2, 3),
+    ]
+    .concat();
+    let (_, frames, damage) = read(&file);
+    assert_eq!(damage, Vec::<String>::new());
+    let seen: Vec<_> = frames
+        .iter()
+        .map(|(bus, record)| (record.frame.id, bus.as_deref(), record.time.map(|time| time.0)))
+        .collect();
+    assert_eq!(
+        seen,
+        [
+            (1, Some("canB"), Some(1_000_000_000)),
+            (2, Some("canA"), None),
+            (3, Some("interface 2"), Some(1_000_000_000)),
+        ]
+    );
+}

@@ -36,7 +36,7 @@ pub(crate) struct Conform {
 
 pub(crate) fn run(out: &Output, global: &Global, arguments: &Conform) -> Result<(), Exit> {
     let name = arguments.eds.display().to_string();
-    let bytes = std::fs::read(&arguments.eds).map_err(|error| Exit::file(&name, &error))?;
+    let bytes = crate::eds::bytes(&arguments.eds)?;
     let device = eds::read(&bytes).map_err(|error| Exit::file(&name, &error))?.device;
     if global.dry_run {
         plan(out, arguments.node, &device);

@@ -357,7 +357,8 @@ fn a_block_upload_is_ended_on_the_wire() {
     let mut bench = Bench::new();
     bench.sim(&["io", "--node", "5"]);
     let mut ear = motion_io::can::open(&bench.endpoint.parse().unwrap()).unwrap();
-    assert_eq!(bench.can(&["sdo", "read", "5", "0x100A", "--block"], 0)["mode"], "block");
+    bench.can(&["sdo", "write", "5", "0x2000:1", &"a long text ".repeat(9), "--type", "string"], 0);
+    assert_eq!(bench.can(&["sdo", "read", "5", "0x2000:1", "--block"], 0)["mode"], "block");
     loop {
         let event = ear.receive(std::time::Duration::from_secs(10)).unwrap();
         let Some(motion_io::can::Event::Frame(frame)) = event else { panic!("no end: {event:?}") };

@@ -432,3 +432,41 @@ fn objects_of_a_linmot_drive_in_words() {
     let unknown = story(traffic, &[]);
     assert!(!unknown.contains("UPID"), "{unknown}");
 }
+
+/// The bus that spoke second but was described first had no name.
+#[test]
+fn every_bus_has_its_name_in_whatever_order_they_speak() {
+    let block = |kind: u32, body: &[u8]| {
+        let total = (12 + body.len() as u32).to_le_bytes();
+        [&kind.to_le_bytes()[..], &total, body, &total].concat()
+    };
+    let interface = |name: &[u8; 4]| block(1, &[&[227, 0, 0, 0, 0, 0, 0, 0, 2, 0, 4, 0][..], name].concat());
+    let packet = |interface: u8| {
+        let head = [[interface, 0, 0, 0], [0; 4], [0; 4], [9, 0, 0, 0], [9, 0, 0, 0]].concat();
+        block(6, &[&head[..], &[0, 0, 7, 1, 1, 0, 0, 0, 5, 0, 0, 0]].concat())
+    };
+    let head = [&0x1A2B_3C4D_u32.to_le_bytes()[..], &[1, 0, 0, 0], &[0xFF; 8]].concat();
+    let file =
+        [block(0x0A0D_0D0A, &head), interface(b"canA"), interface(b"canB"), packet(1), packet(0)].concat();
+    let objects = objects(&file, &[]);
+    let buses: Vec<_> =
+        objects.iter().filter(|object| has(object, json!({ "id": 0x701 }))).map(|o| &o["bus"]).collect();
+    assert_eq!(buses, ["canB", "canA"]);
+}
+
+/// `what repeated itself` was missing above a count of transfers alone; of a transfer that began before the
+/// capture and that nothing names, the object is null.
+#[test]
+fn what_is_not_known_is_not_told_as_known() {
+    let log = "can0 601#4041600000000000\ncan0 581#4B41600000000000\n".repeat(9);
+    assert!(
+        story(&log, &[]).contains("what repeated itself:\n  SDO transfers like those told"),
+        "{}",
+        story(&log, &[])
+    );
+    let late = "can0 601#6000000000000000\ncan0 581#0041424344454647\ncan0 601#7000000000000000\ncan0 581#1141424344454647\n";
+    let objects = objects(late.as_bytes(), &[]);
+    let transfers: Vec<_> = objects.iter().filter(|object| object["kind"] == "sdo-transfer").collect();
+    assert!(transfers.iter().all(|transfer| transfer["index"].is_null() && transfer["subindex"].is_null()));
+    assert_eq!(transfers.len(), 1, "{objects:?}");
+}

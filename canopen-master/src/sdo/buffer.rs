@@ -160,11 +160,19 @@ impl Buffer for &[u8] {
 
 /// An upload replaces what the vector held; what it allocates grows with the data that came, not with
 /// the size that the server indicated.
+/// What a `Vec` takes at most, in bytes.
+#[cfg(feature = "alloc")]
+const MOST: usize = 16 << 20;
+
 #[cfg(feature = "alloc")]
 impl Buffer for alloc::vec::Vec<u8> {
+    /// Room for 16 MiB, so that a server that never ends does not take all memory.
     fn begin(&mut self, size: Option<u32>) -> Result<(), AbortCode> {
         /// Reserved at once at most.
         const RESERVE: usize = 4096;
+        if size.is_some_and(|size| size as usize > MOST) {
+            return Err(AbortCode::OUT_OF_MEMORY);
+        }
         self.clear();
         self.reserve(size.map_or(0, |size| (size as usize).min(RESERVE)));
         Ok(())
@@ -172,6 +180,9 @@ impl Buffer for alloc::vec::Vec<u8> {
 
     #[inline]
     fn write(&mut self, offset: u32, data: &[u8]) -> Result<(), AbortCode> {
+        if offset as usize > MOST {
+            return Err(AbortCode::OUT_OF_MEMORY);
+        }
         self.truncate(offset as usize);
         self.extend_from_slice(data);
         Ok(())

@@ -214,6 +214,8 @@ fn faults() {
             Fault::Size { indicated: 9, found: 14 },
             AbortCode::LENGTH,
         ),
+        // A server that went on like this held the transfer for ever.
+        (&[begin, [0x0E, 0, 0, 0, 0, 0, 0, 0]], Fault::EmptySegment, AbortCode::LENGTH),
         (
             &[[0x41, 0x08, 0x10, 0, 11, 0, 0, 0]],
             Fault::Buffer(AbortCode::OUT_OF_MEMORY),
@@ -234,6 +236,16 @@ fn faults() {
         script.sends(0, [0x80, 0x08, 0x10, 0, a, b, c, d]);
         script.sends_nothing(0);
     }
+}
+
+/// An upload without end filled the memory.
+#[test]
+fn a_vec_takes_16_mib() {
+    let mut buffer = Vec::new();
+    assert_eq!(buffer.begin(Some(u32::MAX)), Err(AbortCode::OUT_OF_MEMORY));
+    assert_eq!(buffer.begin(Some(16 << 20)), Ok(()));
+    assert_eq!(buffer.write(0, &vec![0; 16 << 20]), Ok(()));
+    assert_eq!(buffer.write((16 << 20) + 1, &[0]), Err(AbortCode::OUT_OF_MEMORY));
 }
 
 #[test]

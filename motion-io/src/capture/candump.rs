@@ -1,7 +1,7 @@
 //! candump of can-utils: `-l` logs (`(1436509052.249713) can0 581#4B41600018028FAF`) and screen text
 //! (` (000.001)  can0  TX - -  581   [8]  4B 41 60 00 18 02 8F AF   'KA`.....'`).
 
-use super::reader::Parsed;
+use super::reader::{INNER_CR, Parsed, has_inner_cr};
 use super::record::{Buses, Direction, FrameKind, MAX_DATA, Record, Time};
 use super::scan::{date_time, decimal, fixed, hex, hex_byte, hex_run, nibble, word};
 
@@ -68,13 +68,16 @@ impl Candump {
     }
 
     fn any_line(&mut self, line: &[u8], record: &mut Record, buses: &mut Buses) -> Parsed {
-        if core::mem::take(&mut self.after_error) && line.first() == Some(&b'\t') {
-            return Parsed::Nothing;
-        }
+        // An explanation that goes on, unless it is a frame.
+        let explains = core::mem::take(&mut self.after_error) && line.first() == Some(&b'\t');
         let parsed = match memchr::memchr(0x1B, line) {
+            _ if has_inner_cr(line) => INNER_CR,
             None => parse(line, record, buses),
             Some(_) => parse(&without_colours(line), record, buses),
         };
+        if explains && parsed != Parsed::Frame {
+            return Parsed::Nothing;
+        }
         self.after_error = parsed == Parsed::Frame && record.frame.kind == FrameKind::Error;
         parsed
     }

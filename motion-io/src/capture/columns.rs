@@ -44,11 +44,15 @@ impl Columns {
         record.frame.kind = FrameKind::Data;
         record.frame.extended = false;
         if self.columns.is_empty() {
-            if self.header(text) || is_preamble(text) {
+            if self.header(text) {
                 return Parsed::Nothing;
             }
-            return plain(text, record, buses)
-                .unwrap_or(Parsed::Damaged("bus, identifier, direction, type, length and data expected"));
+            // Before a preamble, for a bus may be called like a line of one.
+            return match plain(text, record, buses) {
+                Some(parsed) => parsed,
+                None if is_preamble(text) => Parsed::Nothing,
+                None => Parsed::Damaged("bus, identifier, direction, type, length and data expected"),
+            };
         }
         self.fields(text, record, buses).unwrap_or(MALFORMED)
     }

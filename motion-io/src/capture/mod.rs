@@ -49,6 +49,9 @@ pub enum CaptureError {
     /// Text of a kind that no format here has.
     #[error("UTF-16 text; captures are ASCII or UTF-8: save it as one of these")]
     Utf16,
+    /// A compressed file.
+    #[error("compressed with {0}: unpack it first")]
+    Compressed(&'static str),
     /// No format that is known here; the start of the content is quoted.
     #[error("no known capture format; it begins with {0:?}")]
     Unrecognised(String),

@@ -14,6 +14,8 @@ const LINK_COOKED: u32 = 113;
 
 const SECTION: u32 = 0x0A0D_0D0A;
 const INTERFACE: u32 = 1;
+/// Of old files; like an enhanced one, but that the number of the interface has 16 bits.
+const PACKET: u32 = 2;
 const SIMPLE_PACKET: u32 = 3;
 const ENHANCED_PACKET: u32 = 6;
 /// Byte order mark of a pcapng section.
@@ -39,7 +41,7 @@ pub(super) enum Packet {
 struct Interface {
     link: u32,
     bus: Option<Bus>,
-    /// Units of time a second.
+    /// Units of time a second; 0: so many that the time is not told.
     per_second: u64,
     offset: i64,
 }
@@ -268,17 +270,21 @@ impl Pcap {
             match kind {
                 INTERFACE => {
                     let block = input.peek(total.min(64 * 1024) as usize)?;
-                    let interface = interface(block, big, buses);
-                    self.interfaces.extend(interface);
+                    let interface = interface(block, big, self.interfaces.len(), buses);
                     if interface.is_none() {
                         held = Some(self.damaged("an interface without a link type"));
                     }
+                    self.interfaces.push(interface.unwrap_or(Interface::UNKNOWN));
                 }
-                ENHANCED_PACKET if total >= 32 => {
+                ENHANCED_PACKET | PACKET if total >= 32 => {
                     let word = |at| u32_at(head, at, big).unwrap_or(0);
-                    let (which, len) = (word(8) as usize, word(20).min(total - 32));
+                    let which = match kind {
+                        PACKET => usize::from(u16_at(head, 8, big).unwrap_or(0)),
+                        _ => word(8) as usize,
+                    };
+                    let len = word(20).min(total - 32);
                     let units = u64::from(word(12)) << 32 | u64::from(word(16));
-                    let time = self.interfaces.get(which).map(|interface| interface.time(units));
+                    let time = self.interfaces.get(which).and_then(|interface| interface.time(units));
                     input.take(28);
                     rest -= 28;
                     held = Some(self.packet(input, which, time, len)?);
@@ -289,7 +295,7 @@ impl Pcap {
                     rest -= 12;
                     held = Some(self.packet(input, 0, None, len)?);
                 }
-                ENHANCED_PACKET | SIMPLE_PACKET => {
+                ENHANCED_PACKET | PACKET | SIMPLE_PACKET => {
                     held = Some(self.damaged("a packet block that is too short"));
                 }
                 _ => {}
@@ -364,9 +370,11 @@ impl Pcap {
 }
 
 impl Interface {
-    fn time(&self, units: u64) -> Time {
-        let nanos = u128::from(units) * 1_000_000_000 / u128::from(self.per_second);
-        Time(i64::try_from(nanos).unwrap_or(i64::MAX).saturating_add(self.offset))
+    const UNKNOWN: Self = Self { link: u32::MAX, bus: None, per_second: 0, offset: 0 };
+
+    fn time(&self, units: u64) -> Option<Time> {
+        let nanos = (u128::from(units) * 1_000_000_000).checked_div(u128::from(self.per_second))?;
+        Some(Time(i64::try_from(nanos).unwrap_or(i64::MAX).saturating_add(self.offset)))
     }
 }
 
@@ -388,7 +396,8 @@ fn same(one: &Result<Record, &'static str>, other: &Result<Record, &'static str>
 }
 
 /// An interface description block.
-fn interface(block: &[u8], big: bool, buses: &mut Buses) -> Option<Interface> {
+/// `number` names an interface behind the first one that has no name.
+fn interface(block: &[u8], big: bool, number: usize, buses: &mut Buses) -> Option<Interface> {
     let link = u32::from(u16_at(block, 8, big)?);
     let mut interface = Interface { link, bus: None, per_second: 1_000_000, offset: 0 };
     let mut at = 16;
@@ -403,16 +412,19 @@ fn interface(block: &[u8], big: bool, buses: &mut Buses) -> Option<Interface> {
             (9, &[resolution]) => {
                 let power = u32::from(resolution & 0x7F);
                 let base: u64 = if resolution & 0x80 == 0 { 10 } else { 2 };
-                interface.per_second = base.checked_pow(power)?;
+                interface.per_second = base.checked_pow(power).unwrap_or(0);
             }
             (14, value) => {
-                let seconds = *value.first_chunk::<8>()?;
+                let Some(&seconds) = value.first_chunk::<8>() else { break };
                 let seconds = if big { i64::from_be_bytes(seconds) } else { i64::from_le_bytes(seconds) };
                 interface.offset = seconds.saturating_mul(1_000_000_000);
             }
             _ => {}
         }
         at += 4 + usize::from(len).next_multiple_of(4);
+    }
+    if interface.bus.is_none() && number > 0 {
+        interface.bus = buses.find(format!("interface {number}").as_bytes());
     }
     Some(interface)
 }

@@ -40,6 +40,14 @@ pub(super) enum TextParser {
     Columns(Columns),
 }
 
+/// Whether a carriage return stands inside a line, where it would end another.
+pub(super) fn has_inner_cr(line: &[u8]) -> bool {
+    memchr::memchr(b'\r', line.trim_ascii_end()).is_some()
+}
+
+pub(super) const INNER_CR: Parsed =
+    Parsed::Damaged("one line expected, several came that a carriage return alone ends");
+
 impl TextParser {
     pub(super) fn new(format: Format) -> Option<Self> {
         Some(match format {
@@ -55,6 +63,7 @@ impl TextParser {
     pub(super) fn line(&mut self, line: &[u8], record: &mut Record, buses: &mut Buses) -> Parsed {
         let parsed = match self {
             Self::Candump(parser) => parser.line(line, record, buses),
+            _ if has_inner_cr(line) => INNER_CR,
             Self::Asc(parser) => parser.line(line, record, buses),
             Self::Trc(parser) => parser.line(line, record, buses),
             Self::Columns(parser) => parser.line(line, record, buses),

@@ -11,8 +11,14 @@ pub(super) const LOOK_AHEAD: usize = 64 * 1024;
 /// How many lines.
 const LINES: usize = 400;
 
-/// How every LB2 telegram begins.
-const LB2_HEADER: [u8; 2] = [0x82, 0x96];
+/// How compressed files begin.
+const COMPRESSED: [(&[u8], &str); 5] = [
+    (b"\x1F\x8B", "gzip"),
+    (b"PK\x03\x04", "zip"),
+    (b"\xFD7zXZ\0", "xz"),
+    (b"BZh", "bzip2"),
+    (b"\x28\xB5\x2F\xFD", "zstd"),
+];
 
 /// A capture format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -62,9 +68,8 @@ pub(super) fn recognise(start: &[u8]) -> Result<Format, CaptureError> {
     if let [0xFF, 0xFE, _, 0, ..] | [0xFE, 0xFF, 0, ..] = *start {
         return Err(CaptureError::Utf16);
     }
-    let is_text = is_text(text);
-    if !is_text && text.windows(2).any(|pair| pair == LB2_HEADER) {
-        return Ok(Format::Lb2Raw);
+    if let Some((_, by)) = COMPRESSED.iter().find(|(magic, _)| start.starts_with(magic)) {
+        return Err(CaptureError::Compressed(by));
     }
     let lines = || text.split(|&byte| byte == b'\n').map(<[u8]>::trim_ascii).take(LINES);
     for line in lines() {
@@ -89,7 +94,7 @@ pub(super) fn recognise(start: &[u8]) -> Result<Format, CaptureError> {
             best = (frames, format);
         }
     }
-    if !is_text && best.0 == 0 {
+    if best.0 == 0 && !is_text(text) {
         return Ok(Format::Lb2Raw);
     }
     let hex = lines().filter(|line| hex_line(line).is_some_and(|line| !line.bytes.is_empty())).count();
@@ -153,6 +158,8 @@ mod tests {
             (b"\x00\x01\x02", Format::Lb2Raw),
             // A log whose end was not yet on the disk when the power went.
             (b"(1.0) can0 123#11\n\0\0\0\0\0\0", Format::Candump),
+            // One byte of noise in it, and what could begin a telegram.
+            (b"(1.0) can0 123#11\n(1.1) can0 1\x0223#11 \x82\x96\n", Format::Candump),
             (b"\xD4\xC3\xB2\xA1", Format::Pcap),
             (b"", Format::Candump),
         ] {
@@ -161,6 +168,8 @@ mod tests {
         for utf16 in [b"\xFF\xFE(\x001\0", b"\xFE\xFF\0(\x001"] {
             assert!(matches!(recognise(utf16), Err(CaptureError::Utf16)));
         }
+        let error = recognise(b"\x1F\x8B\x08\0 \x82\x96").unwrap_err();
+        assert_eq!(error.to_string(), "compressed with gzip: unpack it first");
         let error = recognise(b"\nDear reader,\n").unwrap_err();
         assert_eq!(error.to_string(), "no known capture format; it begins with \"Dear reader,\"");
     }

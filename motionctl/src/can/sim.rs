@@ -43,7 +43,7 @@ pub(crate) fn io(out: &Output, global: &Global, arguments: &SimIo) -> Result<(),
 
 pub(crate) fn file(out: &Output, global: &Global, arguments: &SimFile) -> Result<(), Exit> {
     let name = arguments.eds.display().to_string();
-    let bytes = std::fs::read(&arguments.eds).map_err(|error| Exit::file(&name, &error))?;
+    let bytes = crate::eds::bytes(&arguments.eds)?;
     let device = FileNode::node(&bytes, address(arguments.node.node)?, arguments.node.serial_number)
         .map_err(|error| Exit::file(&name, &error))?;
     run(out, global, &arguments.node, "node", device)

@@ -38,7 +38,7 @@ const TYPES: [(&str, DataType); 21] = [
 pub(crate) fn device(path: Option<&Path>) -> Result<Option<eds::Device>, Exit> {
     let Some(path) = path else { return Ok(None) };
     let name = path.display().to_string();
-    let bytes = std::fs::read(path).map_err(|error| Exit::file(&name, &error))?;
+    let bytes = crate::eds::bytes(path)?;
     let reading = eds::read(&bytes).map_err(|error| Exit::file(&name, &error))?;
     Ok(Some(reading.device))
 }

@@ -1,7 +1,7 @@
 //! Frames in, what they are out: of captures and of buses that are listened to.
 
 use canopen_master::trace::{Kind, Tracer, Transfer};
-use motion_io::capture::{Reader, Record, Time, Times};
+use motion_io::capture::{Bus, Reader, Record, Time, Times};
 
 use super::names::Names;
 use super::{Totals, name_of};
@@ -62,13 +62,11 @@ impl Ear {
             teller.deltas();
         }
         let record = reader.record();
-        if let Some(bus) = record.bus
+        while let Some(bus) = record.bus
             && self.buses.len() <= usize::from(bus.0)
         {
-            self.buses.resize(usize::from(bus.0) + 1, None);
-            if let Some(slot) = self.buses.last_mut() {
-                *slot = reader.bus_name(bus).map(str::to_owned);
-            }
+            let next = u16::try_from(self.buses.len()).map(Bus).unwrap_or(bus);
+            self.buses.push(reader.bus_name(next).map(str::to_owned));
         }
         self.hear(record, teller, totals);
     }

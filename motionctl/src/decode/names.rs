@@ -160,7 +160,7 @@ impl Names {
                     "--eds {argument}: NODE=FILE with a node of 1 to 127 expected"
                 )));
             };
-            let content = std::fs::read(file).map_err(|error| Exit::file(file, &error))?;
+            let content = crate::eds::bytes(std::path::Path::new(file))?;
             let reading = eds::read(&content).map_err(|error| Exit::file(file, &error))?;
             names.devices.push((node, reading.device));
         }

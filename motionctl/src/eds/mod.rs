@@ -36,7 +36,7 @@ pub(crate) fn run(out: &Output, dry_run: bool, command: &Eds) -> Result<(), Exit
 }
 
 /// The bytes of a file, or of standard input for `-`; not more than a device description has.
-fn bytes(path: &std::path::Path) -> Result<Vec<u8>, Exit> {
+pub(crate) fn bytes(path: &std::path::Path) -> Result<Vec<u8>, Exit> {
     let name = path.display().to_string();
     let most = eds::MOST_BYTES as u64 + 1;
     let mut bytes = Vec::new();

@@ -106,6 +106,9 @@ pub enum Fault {
         /// Received so far.
         found: u32,
     },
+    /// A segment of an upload without data that is not the last one.
+    #[error("segment without data, though more are to follow")]
+    EmptySegment,
     /// The caller's buffer refused the data or had none to give.
     #[error("own buffer: {0}")]
     Buffer(AbortCode),
@@ -140,7 +143,7 @@ impl Fault {
         match self {
             Self::Toggle => AbortCode::TOGGLE,
             Self::Unexpected { .. } | Self::Message(_) => AbortCode::COMMAND,
-            Self::Size { .. } => AbortCode::LENGTH,
+            Self::Size { .. } | Self::EmptySegment => AbortCode::LENGTH,
             Self::Buffer(code) => code,
             Self::BlockSize(_) => AbortCode::BLOCK_SIZE,
             Self::Sequence { .. } | Self::NoProgress(_) => AbortCode::SEQUENCE,

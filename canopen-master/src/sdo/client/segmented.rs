@@ -86,6 +86,10 @@ impl<B: Buffer> Client<B> {
         if toggle != expected {
             return self.give_up(Fault::Toggle);
         }
+        // A server may end with nothing; one that goes on with nothing would never end.
+        if data.is_empty() && !last {
+            return self.give_up(Fault::EmptySegment);
+        }
         if !self.take(first(&data.padded(), data.len())) {
             return;
         }
