@@ -350,6 +350,8 @@ fn ports_and_pages() {
     for shell in ["bash", "elvish", "fish", "powershell", "zsh"] {
         let script = run(&["completions", shell]);
         assert!(String::from_utf8_lossy(&script.stdout).contains("monitor"), "{shell}");
+    }
+}
 
 /// The program ended before the frame that ends a block upload had gone out.
 #[test]

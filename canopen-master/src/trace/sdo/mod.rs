@@ -302,7 +302,8 @@ impl Watch {
             // A segment may have looked like the beginning of a transfer: that one never was.
             self.open = late::open(bus, self.node, way, &content, now).map(Box::new);
         }
-        let known = self.open.as_ref().map(|open| open.transfer.at);
+        let nobody = Address::new(0, 0);
+        let known = self.open.as_ref().map(|open| open.transfer.at).filter(|at| *at != nobody);
         let belongs = match self.open.as_mut() {
             Some(open) => step(open, &content),
             None => Step::Foreign,

@@ -7,7 +7,6 @@ mod text;
 
 use std::io::{self, Write};
 
-use canopen_master::Address;
 use canopen_master::trace::{Direction as TransferDirection, Kind, Mode, Outcome, Tracer, Transfer};
 use motion_io::capture::{FrameKind, Record, Time};
 
@@ -180,20 +179,10 @@ impl Teller for Json<'_> {
                 Mode::Block => "block",
             },
         );
-        // Of a transfer that began before the capture nothing may tell the object.
-        let named = !(transfer.late && transfer.at == Address::new(0, 0));
         key!(out, "index");
-        if named {
-            put_number(out, transfer.at.index)
-        } else {
-            out.extend_from_slice(b"null")
-        }
+        put_number(out, transfer.at.index);
         key!(out, "subindex");
-        if named {
-            put_number(out, transfer.at.sub)
-        } else {
-            out.extend_from_slice(b"null")
-        }
+        put_number(out, transfer.at.sub);
         key!(out, "size");
         put_number(out, transfer.size);
         key!(out, "data");

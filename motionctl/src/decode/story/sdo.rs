@@ -95,7 +95,7 @@ impl Story<'_> {
             Outcome::Incomplete if transfer.frames == 1 && !transfer.late => {
                 format!("{verb:<5} {object}: NO ANSWER")
             }
-            Outcome::Incomplete if transfer.lacking => {
+            Outcome::Incomplete if transfer.lacking && !transfer.late => {
                 format!("{verb:<5} {object}: frames are missing in the capture behind {value}{how}")
             }
             Outcome::Incomplete => format!("{verb:<5} {object}: unfinished, {value}{how}"),
