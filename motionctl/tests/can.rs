@@ -362,7 +362,7 @@ fn a_block_upload_is_ended_on_the_wire() {
     bench.can(&["sdo", "write", "5", "0x2000:1", &"a long text ".repeat(9), "--type", "string"], 0);
     assert_eq!(bench.can(&["sdo", "read", "5", "0x2000:1", "--block"], 0)["mode"], "block");
     loop {
-        let event = ear.receive(std::time::Duration::from_secs(10)).unwrap();
+        let event = ear.receive(core::time::Duration::from_secs(10)).unwrap();
         let Some(motion_io::can::Event::Frame(frame)) = event else { panic!("no end: {event:?}") };
         if frame.standard_id() == Some(0x605) && frame.data().first() == Some(&0xA1) {
             break;

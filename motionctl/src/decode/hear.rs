@@ -65,7 +65,7 @@ impl Ear {
         while let Some(bus) = record.bus
             && self.buses.len() <= usize::from(bus.0)
         {
-            let next = u16::try_from(self.buses.len()).map(Bus).unwrap_or(bus);
+            let next = u16::try_from(self.buses.len()).map_or(bus, Bus);
             self.buses.push(reader.bus_name(next).map(str::to_owned));
         }
         self.hear(record, teller, totals);
