@@ -302,8 +302,15 @@ impl Names {
     }
 }
 
-fn quoted(text: &[u8]) -> String {
-    format!("{:?}", String::from_utf8_lossy(text).trim_end_matches('\0'))
+fn quoted(data: &[u8]) -> String {
+    format!("{:?}", text(data))
+}
+
+/// A text of a device: UTF-8, or as devices older than it write, ISO 8859-1; without the zeros at its end.
+pub(crate) fn text(data: &[u8]) -> String {
+    let text = core::str::from_utf8(data)
+        .map_or_else(|_| data.iter().copied().map(char::from).collect(), str::to_owned);
+    text.trim_end_matches('\0').to_owned()
 }
 
 /// Up to 16 bytes in hex; of more, their number too.
@@ -430,6 +437,8 @@ mod tests {
             (Address::new(0x1A00, 1), &[0x10, 0x00, 0x41, 0x60], "6041h:00 status word, 16 bits"),
             (Address::new(0x1800, 1), &[0x81, 0x01, 0x00, 0xC0], "181h, switched off"),
             (Address::new(0x1008, 0), b"LD 2000\0", "\"LD 2000\""),
+            (Address::new(0x1008, 0), b"Sonderger\xE4t", "\"Sonderger\u{E4}t\""),
+            (Address::new(0x1008, 0), "Ger\u{E4}t".as_bytes(), "\"Ger\u{E4}t\""),
             (Address::new(0x6064, 0), &[0xFF, 0xFF, 0xFF, 0xFF], "-1"),
             (Address::new(0x2000, 0), &[1, 2], "01 02"),
         ] {

@@ -92,8 +92,8 @@ impl Eye {
         self.tables = sheet.tables.len();
         self.focus = self.focus.min(self.tables.saturating_sub(1));
         self.rows.resize(self.tables, 0);
-        let paused = if self.paused { "  PAUSED" } else { "" };
-        put(frame, area, 0, &format!("{}{paused}", sheet.head), 0, Style::new().add_modifier(Modifier::BOLD));
+        let paused = if self.paused { "PAUSED  " } else { "" };
+        put(frame, area, 0, &format!("{paused}{}", sheet.head), 0, Style::new().add_modifier(Modifier::BOLD));
         let height = usize::from(area.height);
         let room = height.saturating_sub(2);
         let needs: Vec<usize> = sheet.tables.iter().map(needed).collect();
@@ -290,7 +290,7 @@ mod tests {
         assert_eq!(screen(&mut eye, 60, 24)[22], "0");
         press(&mut eye, KeyCode::Char('p'));
         let lines = screen(&mut eye, 60, 24);
-        assert!(lines[0].ends_with("PAUSED") && lines[23].contains(", . < >"), "{lines:#?}");
+        assert!(lines[0].starts_with("PAUSED") && lines[23].contains(", . < >"), "{lines:#?}");
         for (code, wish) in [
             (KeyCode::Char('q'), Wish::Quit),
             (KeyCode::Esc, Wish::Quit),

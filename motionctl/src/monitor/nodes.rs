@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 use super::bus::{age, seconds};
 use super::sheet::Tone;
 use crate::can::value::hex;
+use crate::decode::names::text;
 use crate::decode::story::{Cycle, Rhythm, Story};
 
 /// A node that has not been heard for so many tenths of its period is silent.
@@ -103,8 +104,7 @@ impl Node {
         match (transfer.at.index, transfer.at.sub) {
             (0x1000, 0) => self.device_type = number,
             (0x1008, 0) => {
-                let text = String::from_utf8_lossy(&transfer.data);
-                self.name = Some(text.trim_end_matches(['\0', ' ']).to_owned());
+                self.name = Some(text(&transfer.data).trim_end().to_owned());
             }
             (0x1018, sub @ 1..=4) => {
                 if let Some(part) = self.identity.get_mut(usize::from(sub) - 1) {
@@ -198,7 +198,7 @@ impl<'a> View<'a> {
 
     pub(super) fn cells(&self) -> [String; 10] {
         let node = self.node;
-        let text = |text: Option<&dyn core::fmt::Display>| text.map_or("-".into(), ToString::to_string);
+        let shown = |state: Option<&dyn core::fmt::Display>| state.map_or("-".into(), ToString::to_string);
         let control = self.control;
         let sdo = match (node.transfers, node.failed) {
             (0, _) => String::new(),
@@ -213,8 +213,8 @@ impl<'a> View<'a> {
         });
         [
             self.id.to_string(),
-            text(self.state.as_ref().map(|state| state as _)),
-            text(self.drive.as_ref().map(|state| state as _)),
+            shown(self.state.as_ref().map(|state| state as _)),
+            shown(self.drive.as_ref().map(|state| state as _)),
             self.device(),
             control.map_or("nothing seen", |control| control.name).into(),
             control.and_then(|control| control.period).map_or_else(String::new, in_ms),

@@ -149,10 +149,11 @@ impl Subject for Replay<'_> {
     fn sheet(&self) -> Sheet {
         let mut sheet = self.buses.sheet();
         let total = self.total.unwrap_or(self.at);
-        sheet.head = format!("{}  frame {} of {total}", sheet.head, self.at);
-        if self.damaged > 0 {
-            sheet.head.push_str(&format!("  {} lines gave no frame", self.damaged));
-        }
+        let damaged = match self.damaged {
+            0 => String::new(),
+            lines => format!("{lines} lines gave no frame  "),
+        };
+        sheet.head = format!("frame {} of {total}  {damaged}{}", self.at, sheet.head);
         sheet
     }
 

@@ -106,6 +106,7 @@ pub(super) fn show(out: &Output, subject: &mut dyn Subject, limit: Option<Durati
                 Wish::Quit => return Ok(()),
                 Wish::Go(step) => {
                     subject.go(step)?;
+                    sheet = subject.sheet();
                 }
             }
         }

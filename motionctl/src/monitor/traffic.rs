@@ -103,7 +103,7 @@ impl Traffic {
     /// In the second before `now`, or since `start` where that is less.
     pub(super) fn rate(&self, now: i64, start: i64) -> Rate {
         let newest = now.div_euclid(STEP);
-        let from = (newest - STEPS as i64 + 1) * STEP;
+        let from = (newest - STEPS as i64 + 1).saturating_mul(STEP);
         let span = now.saturating_sub(from.max(start));
         let mut carried = Carried::default();
         let steps = self.steps.iter().filter(|(step, _)| newest - step < STEPS as i64);

@@ -123,7 +123,7 @@ impl<'a> Story<'a> {
 
     /// Seconds, of times of day those since the first frame; to the microsecond.
     fn clock(&self, time: Option<i64>) -> String {
-        let since = time.map(|time| time - self.start.unwrap_or(0));
+        let since = time.map(|time| time.saturating_sub(self.start.unwrap_or(0)));
         since.map(|nanos| Time(nanos / 1000 * 1000).to_string()).unwrap_or_default()
     }
 
@@ -236,7 +236,9 @@ impl<'a> Story<'a> {
         let name = super::NAMES[super::name_of(record.frame.kind, kind)];
         self.repeated();
         self.last.text.clear();
-        let time = time.map(|time| Time(time - self.start.unwrap_or(0)).to_string()).unwrap_or_default();
+        let time = time
+            .map(|time| Time(time.saturating_sub(self.start.unwrap_or(0))).to_string())
+            .unwrap_or_default();
         let copy = if record.loopback { "  (copy)" } else { "" };
         let channel = match kind {
             Kind::CanLink { channel } => format!(" channel {channel}"),

@@ -70,7 +70,7 @@ impl Rhythm {
     /// Over all of it, in nanoseconds.
     pub(crate) fn mean(&self) -> Option<f64> {
         let (first, last) = self.first.zip(self.last).filter(|(first, last)| last > first)?;
-        Some((last - first) as f64 / (self.number - 1) as f64)
+        Some(last.saturating_sub(first) as f64 / (self.number - 1) as f64)
     }
 }
 

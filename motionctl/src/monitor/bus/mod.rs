@@ -322,4 +322,48 @@ mod tests {
         assert_eq!(document["story"].as_array().unwrap().len(), 3);
         assert!(buses.sheet().text().contains("no acknowledge"));
     }
+
+    /// Whatever is on the bus, and whatever time it bears: there is a sheet and a document, and the screen
+    /// can be drawn.
+    #[test]
+    fn any_frames_at_any_time() {
+        let names = Names::default();
+        let mut buses = Buses::new("test".into(), &names, true, Some(10_000));
+        let mut seed = 0x2545_F491_4F6C_DD1D_u64;
+        let mut random = || {
+            seed ^= seed << 13;
+            seed ^= seed >> 7;
+            seed ^= seed << 17;
+            seed
+        };
+        let mut time = 0_i64;
+        for round in 0..30_000 {
+            let bits = random();
+            let data = random().to_le_bytes();
+            let kind = match bits % 16 {
+                0 => FrameKind::Remote,
+                1 => FrameKind::Error,
+                2 => FrameKind::Fd { bit_rate_switch: true, error_passive: false },
+                _ => FrameKind::Data,
+            };
+            // Few nodes, so that their services meet.
+            let extended = bits >> 8 & 0xFF == 0;
+            let id = if extended { bits >> 32 & 0xFF } else { bits >> 32 & 0x783 };
+            let frame = Frame::new(id as u32, extended, kind, &data[..(bits >> 16) as usize % 9]).unwrap();
+            time = match bits >> 20 & 0x3FF {
+                0 => i64::MIN,
+                1 => i64::MAX,
+                2 => -time.saturating_abs(),
+                step => time.saturating_add(step as i64 * 1000),
+            };
+            let given = (bits >> 31 & 7 != 0).then_some(Time(time));
+            buses.hear(&Record { time: given, loopback: bits >> 40 & 15 == 0, ..Record::new(frame) });
+            if round % 1000 == 0 {
+                let sheet = buses.sheet();
+                assert!(!sheet.text().is_empty() && buses.document()["nodes"].is_array());
+            }
+        }
+        buses.finish();
+        assert!(buses.document()["nodes"].as_array().unwrap().len() > 2);
+    }
 }

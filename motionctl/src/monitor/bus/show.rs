@@ -150,9 +150,9 @@ impl Buses<'_> {
     }
 
     pub(in super::super) fn sheet(&self) -> Sheet {
-        let span = self.span().map_or_else(String::new, |span| format!("  {:.1} s", span as f64 / 1e9));
+        let span = self.span().map_or_else(String::new, |span| format!("{:.1} s  ", span as f64 / 1e9));
         Sheet {
-            head: format!("{}{span}", self.title),
+            head: format!("{span}{}", self.title),
             tables: vec![self.bus_table(), self.node_table(), self.cycle_table(), self.story_table()],
         }
     }

@@ -235,7 +235,7 @@ mod tests {
         controller.set_now(Duration::from_secs(1));
         (0..3).for_each(|_| controller.hear(Heard::Silence("no answer to function 50h".into())));
         controller.set_now(Duration::from_secs(3));
-        assert!(controller.sheet().head.ends_with("NO ANSWER for 2.0 s"), "{}", controller.sheet().head);
+        assert!(controller.sheet().head.starts_with("NO ANSWER for 2.0 s"), "{}", controller.sheet().head);
         assert_eq!(controller.document()["answers"], false);
         controller.hear(Heard::Failures(Vec::new()));
         assert_eq!(

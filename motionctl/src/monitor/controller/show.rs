@@ -156,7 +156,7 @@ impl Controller {
         let display = self.display();
         let silent = self.silent.map_or_else(String::new, |since| {
             let nanos = |time: Duration| i64::try_from(time.as_nanos()).ok();
-            format!("  NO ANSWER for {}", age(nanos(self.now), nanos(since)))
+            format!("NO ANSWER for {}  ", age(nanos(self.now), nanos(since)))
         });
         let mut story = Table::new("What happened", &[], "nothing yet");
         story.tail = true;
@@ -164,7 +164,7 @@ impl Controller {
         let mut tables = vec![self.controller_table(&display), self.failure_table()];
         tables.extend(self.watched_table(&display));
         tables.extend([self.axis_table(&display), self.bus_table(&display), story]);
-        Sheet { head: format!("{}  {:.1} s{silent}", self.title, self.now.as_secs_f64()), tables }
+        Sheet { head: format!("{silent}{:.1} s  {}", self.now.as_secs_f64(), self.title), tables }
     }
 
     pub(in super::super) fn document(&self) -> Value {
