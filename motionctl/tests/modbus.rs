@@ -1,9 +1,9 @@
 //! A soft controller that a Modbus TCP client moves.
 #![cfg(unix)]
 
-use std::io::{BufRead, BufReader, Read, Write};
+use std::io::{BufRead, BufReader, Lines, Read, Write};
 use std::net::TcpStream;
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, ChildStdout, Command, Stdio};
 
 const CONFIG: &str = r#"
 [extension]
@@ -82,8 +82,8 @@ impl Client {
     }
 }
 
-#[test]
-fn a_client_moves_an_axis_and_its_loss_halts_it() {
+/// Runs the configuration; what it says, and where its Modbus server is.
+fn start() -> (Running, Lines<BufReader<ChildStdout>>, String) {
     let directory = tempfile::tempdir().unwrap();
     std::fs::write(directory.path().join("run.toml"), CONFIG).unwrap();
     let mut child = Command::new(env!("CARGO_BIN_EXE_motionctl"))
@@ -94,9 +94,14 @@ fn a_client_moves_an_axis_and_its_loss_halts_it() {
         .spawn()
         .unwrap();
     let mut said = BufReader::new(child.stdout.take().unwrap()).lines();
-    let _running = Running(child);
     let line = said.next().unwrap().unwrap();
     let address = line.strip_prefix("Modbus TCP at ").unwrap_or_else(|| panic!("{line}")).to_string();
+    (Running(child), said, address)
+}
+
+#[test]
+fn a_client_moves_an_axis_and_its_loss_halts_it() {
+    let (_running, said, address) = start();
 
     let mut client = Client(TcpStream::connect(&address).unwrap());
     assert_eq!(client.ask(&[1, 3, 0, 6, 0, 1])[1..], [0x83, 2], "only what [060] says");
@@ -123,4 +128,91 @@ fn a_client_moves_an_axis_and_its_loss_halts_it() {
     for _ in 0..50 {
         assert_eq!(client.status(), (0b11, 0, before));
     }
+}
+
+/// Random bytes, requests cut short, wrong lengths, connections that end in the middle: each ends its own
+/// connection at most; another client is served all the while, and the axis does not move.
+#[test]
+fn garbage_disturbs_nobody() {
+    let (_running, _said, address) = start();
+    let connect = || TcpStream::connect(&address).unwrap();
+    let mut good = Client(connect());
+    good.command(1, 0, 0);
+    good.until("enabled at standstill", |(status, ..)| status & 0b11 == 0b11);
+    let mut random = 7u32;
+    let mut next = || {
+        random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (random >> 24) as u8
+    };
+    let shapes: [&[u8]; 7] = [
+        b"GET / HTTP/1.1\r\nHost: x\r\n\r\n",
+        &[0, 1, 0, 0, 0, 6, 1, 3, 0],
+        &[0, 1, 0, 0, 0, 0],
+        &[0, 1, 0, 0, 0xFF, 0xFF, 1, 3],
+        &[0, 1, 0x55, 0xAA, 0, 6, 1, 3, 0, 0, 0, 1],
+        &[0, 1, 0, 0, 0, 2, 1, 0x83],
+        &[0],
+    ];
+    let mut open = Vec::new();
+    for round in 0..60 {
+        let mut stream = connect();
+        let bytes = match shapes.get(round % 9) {
+            Some(shape) => shape.to_vec(),
+            None => (0..400).map(|_| next()).collect(),
+        };
+        // A server that has closed already is no failure here.
+        let _ = stream.write_all(&bytes);
+        // Every third one stays, with what it began.
+        if round % 3 == 0 {
+            open.push(stream);
+        }
+        assert_eq!(good.status(), (0b11, 0, 0), "round {round}");
+    }
+    // Exceptions leave a connection as it is.
+    let mut client = Client(connect());
+    for (request, exception) in [
+        (&[1, 1, 0, 0, 0, 1][..], [0x81, 1]),
+        (&[1, 99], [0xE3, 1]),
+        (&[1, 3, 0xFF, 0xFF, 0, 1], [0x83, 2]),
+        (&[1, 3, 0, 0, 0, 0], [0x83, 3]),
+        (&[1, 16, 0, 0, 0, 1, 2, 1], [0x90, 3]),
+    ] {
+        assert_eq!(client.ask(request)[1..], exception, "{request:?}");
+    }
+    assert_eq!(client.status(), (0b11, 0, 0));
+}
+
+/// One client too many takes the place of the one that has been silent for longest.
+#[test]
+fn silent_clients_do_not_lock_others_out() {
+    let (_running, _said, address) = start();
+    let mut first = Client(TcpStream::connect(&address).unwrap());
+    first.status();
+    let silent: Vec<_> = (0..20)
+        .map(|_| {
+            first.status();
+            TcpStream::connect(&address).unwrap()
+        })
+        .collect();
+    let mut late = Client(TcpStream::connect(&address).unwrap());
+    late.status();
+    first.status();
+    // The first of the silent ones has been closed.
+    assert!(matches!((&silent[0]).read(&mut [0]), Ok(0) | Err(_)));
+}
+
+/// A client that asks without end and never reads does not keep the controller from ending.
+#[test]
+fn a_client_that_does_not_read_does_not_hold_the_end_up() {
+    let (mut running, said, address) = start();
+    let mut stream = TcpStream::connect(&address).unwrap();
+    let request = [0, 1, 0, 0, 0, 6, 1, 4, 0, 0, 0, 6].repeat(100);
+    stream.set_write_timeout(Some(core::time::Duration::from_millis(300))).unwrap();
+    // Until both ways are full, or the server has given up.
+    while stream.write_all(&request).is_ok() {}
+    let pid = running.0.id().to_string();
+    assert!(Command::new("kill").args(["-TERM", &pid]).status().unwrap().success());
+    // Its output ends with it.
+    assert!(said.map_while(Result::ok).last().is_some());
+    assert!(running.0.wait().unwrap().success());
 }

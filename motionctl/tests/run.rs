@@ -263,4 +263,92 @@ fn what_cannot_run_is_named() {
     run("[parameters]\n0 = 2\n").ends(2).says("109");
     run("[[simulate]]\nkind = \"drive\"\nbus = \"can1\"\nnode = 1\n").ends(2);
     bench.run(&["run", "absent.toml"]).ends(5).says("absent.toml");
+    bench.run(&["run", "."]).ends(5);
+}
+
+/// Every mistake is named with its place, with status 2, before anything is begun.
+#[test]
+fn mistakes_in_a_configuration_are_named() {
+    let bench = Bench::new();
+    let plant =
+        |line: &str| format!("[[simulate]]\nkind = \"plant\"\nblock = 1\ndrive = \"first-order\"\n{line}\n");
+    let step = |line: &str| format!("[[program]]\naxis = 1\n{line}\n");
+    let bus = "[can1]\nendpoint = \"virtual:a\"\n";
+    let io = "[[simulate]]\nkind = \"io\"\nbus = \"can1\"\nnode = 5\n";
+    let serial = |line: &str| format!("[[serial]]\nport = \"COM 2\"\nprotocol = \"lb2\"\n{line}\n");
+    let cases: &[(String, &[&str])] = &[
+        ("[parameters\n".into(), &["line 1"]),
+        ("[can1]\nendpoint = 5\n".into(), &["line 2", "string"]),
+        ("[can1]\nendpoint = \"virtual:a\"\nbitrat = 1\n".into(), &["line 3", "bitrat"]),
+        (format!("{bus}{bus}"), &["can1", "duplicate key"]),
+        ("[can1]\nendpoint = \"virtual\"\n".into(), &["virtual"]),
+        ("[can3]\nendpoint = \"virtual:a\"\n".into(), &["can3"]),
+        ("[controller]\nmodel = \"x\"\n".into(), &["line 2"]),
+        ("[controller]\ndevice_number = 256\n".into(), &["line 2", "256"]),
+        ("[controller]\ndevice_number = 32\n".into(), &["= 32"]),
+        ("[parameters]\nnonsense = 1\n".into(), &["nonsense"]),
+        ("[parameters]\n50 = 1\n".into(), &["50"]),
+        ("[parameters]\n642 = 1.5\n".into(), &["line 2", "whole number"]),
+        ("[parameters]\n642 = 99999999999\n".into(), &["line 2"]),
+        ("[parameters]\n642 = 1\n\"V max.@Axis 1\" = 2\n".into(), &["set twice", "V max."]),
+        ("[parameters]\n300 = \"Chief\"\n".into(), &["Chief"]),
+        (serial("endpoint = \"serial:/dev/null?baud=fast\""), &["baud", "fast"]),
+        (serial("endpoint = \"pty:A\"") + &serial("endpoint = \"pty:B\""), &["Com2", "twice"]),
+        (
+            "[can1]\nendpoint = \"slcan-pty:A\"\n[can2]\nendpoint = \"slcan-pty:A\"\n".into(),
+            &["slcan-pty:A", "twice"],
+        ),
+        (format!("{bus}{io}{io}"), &["node 5", "twice"]),
+        (format!("{bus}{}", io.replace("node = 5", "node = 0")), &["node 0", "1 to 127"]),
+        (plant("speed = nan"), &["speed NaN"]),
+        (plant("speed = inf"), &["speed inf"]),
+        (plant("speed = -5"), &["speed -5"]),
+        (plant("speed = 1\ntau = 0"), &["tau 0"]),
+        (plant("speed = 1\nedges = 0"), &["edges 0"]),
+        (plant("speed = 1\nmark = -9223372036854775808"), &["mark"]),
+        (plant("speed = 1\nlimits = [{ input = \"I9.0\", position = 1, upper = true }]"), &["I9.0"]),
+        (plant("speed = 1\nlimits = [{ input = \"I1.0\", position = nan, upper = true }]"), &["NaN"]),
+        (plant("speed = 1") + &plant("speed = 1"), &["block 1", "twice"]),
+        (plant("speed = 1").replace("block = 1", "block = 4"), &["block 4", "1 to 3"]),
+        (step("at = -1\ndo = \"home\""), &["home at -1 s", "from 0 on"]),
+        (step("at = nan\ndo = \"home\""), &["from 0 on"]),
+        (step("at = 1e300\ndo = \"home\""), &["from 0 on"]),
+        (step("at = 0\ndo = \"jog\"\nfor = inf"), &["for inf", "above 0"]),
+        (step("at = 0\ndo = \"jog\"\nfor = -1"), &["for -1", "above 0"]),
+        (step("at = 0\ndo = \"fly\""), &["line 4", "fly"]),
+        (step("at = 0\ndo = \"move-absolute\"\nposition = 9999999999"), &["line 5"]),
+        (step("at = 0\ndo = \"move-absolute\"\nposition = 1\nvelocity = -1"), &["velocity -1"]),
+        (step("at = 0\ndo = \"home\"").replace("axis = 1", "axis = 7"), &["axis 7", "1 to 6"]),
+        (step("at = 0\ndo = \"gear-in\"\ninput = 7\nnumerator = 1"), &["input 7", "1 to 6"]),
+        (step("at = 0\ndo = \"gear-in\"\ninput = 1"), &["numerator is missing"]),
+        (step("at = 0\ndo = \"gear-in\"\ninput = 1\nnumerator = 1\ndenominator = 0"), &["other than 0"]),
+        ("[extension]\nkind = \"modbus-tcp\"\nlisten = \"here\"\n".into(), &["listen", "HOST:PORT"]),
+        ("[extension]\nkind = \"modbus-tcp\"\nlisten = \"[::1]:0\"\nwatchdog = -1\n".into(), &["watchdog"]),
+        ("[extension]\nkind = \"carrier-pigeon\"\n".into(), &["carrier-pigeon"]),
+    ];
+    let mut wrong = Vec::new();
+    for (text, words) in cases {
+        std::fs::write(bench.path("run.toml"), text).unwrap();
+        let ran = bench.run(&["run", "run.toml", "--for", "0.05"]);
+        let said = ran.stderr();
+        let named = words.iter().chain(&["run.toml"]).all(|word| said.contains(word));
+        if ran.0.status.code() != Some(2) || !named {
+            wrong.push(format!("{text}{:?}, {words:?} expected: {said}", ran.0.status.code()));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    std::fs::write(bench.path("run.toml"), "").unwrap();
+    for seconds in ["-1", "nan", "1e300"] {
+        bench.run(&["run", "run.toml", &format!("--for={seconds}")]).ends(2).says("--for");
+    }
+    bench.run(&["run", "run.toml", "--for", "0.05", "--record", "no/such.csv"]).ends(5).says("no/such.csv");
+    std::fs::write(bench.path("run.toml"), [0xFF, 0xFE, 0]).unwrap();
+    bench.run(&["run", "run.toml"]).ends(5).says("run.toml");
+    std::fs::write(bench.path("run.toml"), "[controller]\nstate = \"run.toml\"\n").unwrap();
+    bench.run(&["run", "run.toml", "--for", "0.05"]).ends(5).says("run.toml");
+    let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let taken = listener.local_addr().unwrap().to_string();
+    let text = format!("[extension]\nkind = \"modbus-tcp\"\nlisten = \"{taken}\"\n");
+    std::fs::write(bench.path("run.toml"), text).unwrap();
+    bench.run(&["run", "run.toml", "--for", "0.05"]).ends(5).says(&taken);
 }

@@ -89,7 +89,7 @@ fn number(value: &f64) -> String {
     // A rounding error about zero is zero.
     let rounded = (value * 1e6).round() / 1e6;
     if rounded.abs() < 1000.0 {
-        return format!("{rounded}");
+        return format!("{rounded}").replace('-', "−");
     }
     let digits = format!("{:.0}", rounded.abs());
     let mut text = String::new();
@@ -210,7 +210,7 @@ mod tests {
     #[test]
     fn numbers_are_read_at_a_glance() {
         let text = |value: f64| number(&value).replace('\u{2009}', " ");
-        assert_eq!([0.0, -0.5, 999.0].map(text), ["0", "-0.5", "999"]);
+        assert_eq!([0.0, -0.5, 999.0].map(text), ["0", "−0.5", "999"]);
         assert_eq!([1000.0, -3_276_800.0, 1e-12].map(text), ["1 000", "−3 276 800", "0"]);
     }
 

@@ -141,9 +141,16 @@ const fn watchdog() -> f64 {
 impl Extension {
     pub(super) fn open(&self) -> Result<super::modbus::Server, Exit> {
         let Self::ModbusTcp { listen, unit, watchdog } = self;
-        let watchdog = Duration::try_from_secs_f64(*watchdog)
-            .map_err(|error| Exit::usage(format!("[extension] watchdog = {watchdog}: {error}")))?;
+        let watchdog = Duration::from_secs_f64(*watchdog);
         super::modbus::Server::listen(listen, *unit, watchdog)
+    }
+
+    fn check(&self) -> Result<(), Exit> {
+        let Self::ModbusTcp { watchdog, .. } = self;
+        if Duration::try_from_secs_f64(*watchdog).is_ok_and(|time| !time.is_zero()) {
+            return Ok(());
+        }
+        Err(Exit::usage(format!("[extension] watchdog = {watchdog}: a time above 0 expected")))
     }
 }
 
@@ -220,6 +227,38 @@ const fn one() -> f64 {
     1.0
 }
 
+impl PlantSection {
+    /// What the simulation can compute.
+    fn check(&self) -> Result<(), Exit> {
+        if !(1..=3).contains(&self.block) {
+            return Err(Exit::usage(format!("plant: block {}, 1 to 3 expected", self.block)));
+        }
+        let wrong = |name: &str, value: f64, expected: &str| {
+            Err(Exit::usage(format!("plant on block {}: {name} {value}, {expected} expected", self.block)))
+        };
+        let two_speed = self.drive == DriveKind::TwoSpeed;
+        let ranges = [
+            ("speed", self.speed, 1e-3, 1e9),
+            ("slow", if two_speed { self.slow } else { 1.0 }, 1e-3, 1e9),
+            ("tau", self.tau, 1e-4, 1e3),
+            ("step", self.step, 1e-6, 1e6),
+            ("edges", self.edges, 1e-6, 1e4),
+        ];
+        for (name, value, least, most) in ranges {
+            if !(least..=most).contains(&value) {
+                return wrong(name, value, &format!("{least:e} to {most:e}"));
+            }
+        }
+        if self.mark.abs_diff(0) > 1 << 53 {
+            return wrong("mark", self.mark as f64, "an edge within ±2^53");
+        }
+        match self.limits.iter().find(|limit| !limit.position.is_finite()) {
+            Some(limit) => wrong("limit at position", limit.position, "a number"),
+            None => Ok(()),
+        }
+    }
+}
+
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct LimitSection {
@@ -290,6 +329,9 @@ impl Config {
                 return Err(Exit::usage(format!("{}: {bus:?} is not connected", step.words())));
             }
         }
+        self.parameters()?;
+        self.extension.as_ref().map_or(Ok(()), Extension::check)?;
+        self.check_wires()?;
         for device in &self.simulate {
             if let Simulated::Drive { node, .. } | Simulated::Io { node, .. } = device
                 && !(1..=127).contains(node)
@@ -297,9 +339,7 @@ impl Config {
                 return Err(Exit::usage(format!("a simulated device has node {node}, 1 to 127 expected")));
             }
             match device {
-                Simulated::Plant(plant) if !(1..=3).contains(&plant.block) => {
-                    return Err(Exit::usage(format!("plant: block {}, 1 to 3 expected", plant.block)));
-                }
+                Simulated::Plant(plant) => plant.check()?,
                 Simulated::Drive { bus, .. } | Simulated::Io { bus, .. } if self.can(*bus).is_none() => {
                     return Err(Exit::usage(format!(
                         "a simulated device is on {bus:?}, which is not connected"
@@ -309,6 +349,41 @@ impl Config {
             }
         }
         Ok(())
+    }
+
+    /// Nothing is on a place where something else is.
+    fn check_wires(&self) -> Result<(), Exit> {
+        let twice = |what: &str| Err(Exit::usage(format!("{what} is there twice")));
+        let mut ends = Vec::new();
+        for (at, serial) in self.serial.iter().enumerate() {
+            if self.serial.iter().take(at).any(|other| other.port == serial.port) {
+                return twice(&format!("[[serial]] port {:?}", serial.port));
+            }
+            ends.push(serial.endpoint()?.to_string());
+        }
+        for can in [&self.can1, &self.can2].into_iter().flatten() {
+            let endpoint = can.endpoint()?;
+            // An adapter serves one bus; networks may be on one wire.
+            if let CanEndpoint::Slcan { .. } | CanEndpoint::SlcanPty { .. } = endpoint {
+                ends.push(can.endpoint.clone());
+            }
+        }
+        if let Some(end) =
+            ends.iter().enumerate().find(|(at, end)| ends.iter().take(*at).any(|one| one == *end))
+        {
+            return twice(&format!("endpoint {:?}", end.1));
+        }
+        let place = |device: &Simulated| match device {
+            Simulated::Drive { bus, node } | Simulated::Io { bus, node } => {
+                format!("node {node} on {bus:?}")
+            }
+            Simulated::Plant(plant) => format!("plant on block {}", plant.block),
+        };
+        let places: Vec<_> = self.simulate.iter().map(place).collect();
+        match places.iter().enumerate().find(|(at, one)| places.iter().take(*at).any(|other| other == *one)) {
+            Some((_, place)) => twice(&format!("[[simulate]] {place}")),
+            None => Ok(()),
+        }
     }
 
     pub(super) const fn can(&self, bus: BusName) -> Option<&Can> {
@@ -329,9 +404,13 @@ impl Config {
             let value = match value {
                 Setting::Number(number) => *number,
                 Setting::Text(text) => {
-                    entry.parse(text, &Values::factory()).map_err(|error| Exit::usage(error.to_string()))?
+                    let wrong = |error: &dyn core::fmt::Display| Exit::usage(format!("{text:?}: {error}"));
+                    entry.parse(text, &Values::factory()).map_err(|error| wrong(&error))?
                 }
             };
+            if list.iter().any(|(index, _)| *index == entry.index()) {
+                return Err(Exit::usage(format!("{key}: {entry} is set twice")));
+            }
             list.push((entry.index(), value));
         }
         Ok(list)
@@ -391,7 +470,6 @@ mod tests {
         assert!(
             error("[[simulate]]\nkind = \"drive\"\nbus = \"can1\"\nnode = 1\n").contains("not connected")
         );
-        let unknown = read("[parameters]\n50 = 1\n").unwrap().parameters().unwrap_err();
-        assert!(unknown.message.contains("50"), "{}", unknown.message);
+        assert!(error("[parameters]\n50 = 1\n").contains("[050]"));
     }
 }

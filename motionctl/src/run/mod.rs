@@ -60,7 +60,9 @@ pub(crate) fn run(out: &Output, arguments: &cli::Run) -> Result<(), Exit> {
         None => None,
     };
     let recorder = arguments.record.as_deref().map(Recorder::create).transpose()?;
-    let ended = begin(out, &config, flash.as_deref(), limit, recorder.as_ref());
+    let ended = begin(out, &config, flash.as_deref(), limit, recorder.as_ref()).map_err(|exit| {
+        if exit.status == 2 { exit.context(&arguments.file.display().to_string()) } else { exit }
+    });
     // What was recorded is kept whatever ended the run.
     let recorded = recorder.map_or(Ok(()), Recorder::finish);
     ended.and(recorded)

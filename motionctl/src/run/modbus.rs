@@ -5,7 +5,7 @@
 //! one as its high byte. What lies beyond the sizes `[060]`, `[061]` is refused as an illegal data address.
 
 use core::net::SocketAddr;
-use core::sync::atomic::{AtomicBool, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use core::time::Duration;
 use std::io::{self, Read, Write};
 use std::net::{TcpListener, TcpStream};
@@ -26,6 +26,8 @@ const HEADER: usize = 6;
 const LONGEST: usize = 260;
 /// Clients at one time.
 const CLIENTS: usize = 8;
+/// How long a client may take to accept an answer.
+const PATIENCE: Duration = Duration::from_secs(1);
 /// How long a thread waits before it looks whether it is to end.
 const LOOK: Duration = Duration::from_millis(100);
 
@@ -57,7 +59,12 @@ fn lock(images: &Mutex<Images>) -> std::sync::MutexGuard<'_, Images> {
 impl Server {
     /// Listens at `HOST:PORT` as this unit; 0 answers every unit number.
     pub(super) fn listen(address: &str, unit: u8, watchdog: Duration) -> Result<Self, Exit> {
-        let trouble = |error: io::Error| Exit::file(&format!("Modbus TCP at {address}"), &error);
+        let trouble = |error: io::Error| match error.kind() {
+            io::ErrorKind::InvalidInput => {
+                Exit::usage(format!("[extension] listen = {address:?}: HOST:PORT expected, {error}"))
+            }
+            _ => Exit::file(&format!("Modbus TCP at {address}"), &error),
+        };
         let listener = TcpListener::bind(address).map_err(trouble)?;
         listener.set_nonblocking(true).map_err(trouble)?;
         let bound = listener.local_addr().map_err(trouble)?;
@@ -98,26 +105,45 @@ impl Drop for Server {
     }
 }
 
-/// Takes clients until the flag is set.
-fn accept(listener: &TcpListener, unit: u8, images: &Arc<Mutex<Images>>, stop: &Arc<AtomicBool>) {
-    let mut clients: Vec<JoinHandle<()>> = Vec::new();
+/// A client that is being served.
+struct Client {
+    thread: JoinHandle<()>,
+    /// Ends this client alone.
+    stop: Arc<AtomicBool>,
+    /// Its last request, ms since the server's start and one; 0 = none yet.
+    heard: Arc<AtomicU64>,
+}
+
+/// Takes clients until the flag is set. One too many takes the place of the one that has been silent for
+/// longest (Modbus messaging on TCP/IP implementation guide, 4.3.1.1): a client that has lost its power
+/// never closes its connection.
+fn accept(listener: &TcpListener, unit: u8, images: &Arc<Mutex<Images>>, stop: &AtomicBool) {
+    let start = Instant::now();
+    let mut clients: Vec<Client> = Vec::new();
     while !stop.load(Ordering::Relaxed) {
-        clients.retain(|client| !client.is_finished());
-        match listener.accept() {
-            // One too many is closed at once.
-            Ok((stream, _)) if clients.len() < CLIENTS => {
-                let (images, stop) = (Arc::clone(images), Arc::clone(stop));
-                clients.push(std::thread::spawn(move || {
-                    // A client that goes, in whatever way, is gone.
-                    let _ = serve(stream, unit, &images, &stop);
-                }));
-            }
-            Ok(_) => {}
-            Err(_) => std::thread::sleep(LOOK),
+        clients.retain(|client| !client.thread.is_finished());
+        let Ok((stream, _)) = listener.accept() else {
+            std::thread::sleep(LOOK);
+            continue;
+        };
+        let going = |client: &&Client| !client.stop.load(Ordering::Relaxed);
+        if clients.iter().filter(going).count() >= CLIENTS {
+            let silent =
+                clients.iter().filter(going).min_by_key(|client| client.heard.load(Ordering::Relaxed));
+            silent.inspect(|client| client.stop.store(true, Ordering::Relaxed));
         }
+        let now = move || start.elapsed().as_millis() as u64 + 1;
+        let (own, heard) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicU64::new(0)));
+        let (images, ends, hears) = (Arc::clone(images), Arc::clone(&own), Arc::clone(&heard));
+        let thread = std::thread::spawn(move || {
+            // A client that goes, in whatever way, is gone.
+            let _ = serve(stream, unit, &images, &ends, || hears.store(now(), Ordering::Relaxed));
+        });
+        clients.push(Client { thread, stop: own, heard });
     }
     for client in clients {
-        let _ = client.join();
+        client.stop.store(true, Ordering::Relaxed);
+        let _ = client.thread.join();
     }
 }
 
@@ -140,9 +166,16 @@ fn fill(stream: &mut TcpStream, buffer: &mut [u8], stop: &AtomicBool) -> io::Res
     Ok(true)
 }
 
-fn serve(mut stream: TcpStream, unit: u8, images: &Mutex<Images>, stop: &AtomicBool) -> io::Result<()> {
+fn serve(
+    mut stream: TcpStream,
+    unit: u8,
+    images: &Mutex<Images>,
+    stop: &AtomicBool,
+    heard: impl Fn(),
+) -> io::Result<()> {
     stream.set_nonblocking(false)?;
     stream.set_read_timeout(Some(LOOK))?;
+    stream.set_write_timeout(Some(PATIENCE))?;
     stream.set_nodelay(true)?;
     let mut request = [0; LONGEST];
     loop {
@@ -160,7 +193,11 @@ fn serve(mut stream: TcpStream, unit: u8, images: &Mutex<Images>, stop: &AtomicB
         }
         let Some(request) = request.get(..HEADER + len) else { return Ok(()) };
         let Ok(answer) = answer(request, unit, images) else { return Ok(()) };
+        heard();
         stream.write_all(&answer)?;
+        if stop.load(Ordering::Relaxed) {
+            return Ok(());
+        }
     }
 }
 

@@ -118,8 +118,17 @@ impl Step {
     }
 
     pub(super) fn check(&self) -> Result<(), Exit> {
-        if !(self.at >= 0.0 && self.at.is_finite()) {
+        if Duration::try_from_secs_f64(self.at).is_err() {
             return Err(self.wrong("at: a time from 0 on expected"));
+        }
+        if let Some(time) =
+            self.duration.filter(|time| !Duration::try_from_secs_f64(*time).is_ok_and(|t| !t.is_zero()))
+        {
+            return Err(self.wrong(format!("for {time}, a time above 0 expected")));
+        }
+        let to_a_position = matches!(self.action, Action::MoveAbsolute | Action::MoveRelative);
+        if let Some(velocity) = self.velocity.filter(|velocity| to_a_position && *velocity <= 0) {
+            return Err(self.wrong(format!("velocity {velocity}, above 0 expected")));
         }
         match self.action {
             Action::Write => {
@@ -193,6 +202,6 @@ impl Step {
 
     /// When what is held ends.
     pub(super) fn end(&self) -> Option<Duration> {
-        self.duration.map(|duration| self.begin().saturating_add(Duration::from_secs_f64(duration.max(0.0))))
+        self.duration.map(|duration| self.begin().saturating_add(Duration::from_secs_f64(duration)))
     }
 }
