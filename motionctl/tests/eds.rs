@@ -45,7 +45,9 @@ fn check_names_line_and_clause() {
     bench.run(&["eds", "check", "broken.eds"]).ends(1).says("DataType is no number");
 
     std::fs::write(bench.path("b.eds"), "what is this\n").unwrap();
-    bench.run(&["eds", "check", "b.eds"]).ends(1).says("no device description: no section of an object");
+    let refused = bench.run(&["eds", "check", "b.eds"]).ends(1);
+    assert_eq!(refused.stdout().matches("no device description: no section of an object").count(), 1);
+    assert!(!refused.stderr().contains("no device description"), "{}", refused.stderr());
     bench.run(&["eds", "check", "absent.eds"]).ends(5);
 }
 
@@ -103,6 +105,48 @@ fn convert_changes_what_it_is_told_and_nothing_else() {
         .run(&["eds", "convert", "a.eds", "x.dcf", "--set", "Heartbeat=100000"])
         .ends(2)
         .says("out of range");
+}
+
+/// What a description should not hold is kept where nothing is to change, and not put into one.
+#[test]
+fn a_description_stays_as_it_is_and_takes_no_values() {
+    let bench = bench();
+    let commissioning = "AccessType=rw\r\nDefaultValue=0\r\nParameterValue=5\r\n";
+    let odd = EDS.replace("AccessType=rw\r\nDefaultValue=0\r\n", commissioning)
+        + "[DeviceComissioning]\r\nNodeID=5\r\n";
+    std::fs::write(bench.path("odd.eds"), &odd).unwrap();
+    bench
+        .run(&["eds", "convert", "odd.eds", "same.eds"])
+        .ends(0)
+        .says("a description should not: it is kept");
+    assert_eq!(std::fs::read_to_string(bench.path("same.eds")).unwrap(), odd);
+    bench.run(&["eds", "convert", "odd.eds", "other.xdd"]).ends(0).says("1 configured values");
+
+    for change in [["--set", "0x1017:0=500"], ["--node", "5"], ["--bit-rate", "500"], ["--concise", "a.bin"]]
+    {
+        for name in ["x.eds", "x.xdd"] {
+            let command = [&["eds", "convert", "a.eds", name], &change[..]].concat();
+            bench.run(&command).ends(2).says("holds no configured values").says("a .dcf, .xdc or .bin");
+            assert!(!bench.path(name).exists());
+        }
+    }
+}
+
+/// A PDO of which the COB-ID depends on the node ID cannot be taken out of service without it.
+#[test]
+fn a_mapping_needs_the_node_id_for_a_concise_dcf() {
+    let bench = Bench::new();
+    let more = "[1A00]\r\nParameterName=Map\r\nObjectType=9\r\nSubNumber=1\r\n[1A00sub1]\r\nParameterName=1\r\n\
+        DataType=7\r\nAccessType=rw\r\nDefaultValue=0\r\nParameterValue=0x10010008\r\n";
+    std::fs::write(bench.path("a.dcf"), format!("{EDS}{more}")).unwrap();
+    bench
+        .run(&["eds", "convert", "a.dcf", "a.bin"])
+        .ends(1)
+        .says("1800h:01: depends on the node ID: give it by --node N");
+    assert!(!bench.path("a.bin").exists());
+    bench.run(&["eds", "convert", "a.dcf", "a.bin", "--node", "5"]).ends(0);
+    let concise = std::fs::read(bench.path("a.bin")).unwrap();
+    assert_eq!(concise[..15], [4, 0, 0, 0, 0x00, 0x18, 1, 4, 0, 0, 0, 0x85, 1, 0, 0x80]);
 }
 
 /// An EDS has no word for `noAccess`: what gets lost is said.

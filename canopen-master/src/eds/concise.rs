@@ -131,7 +131,7 @@ impl Device {
     /// mapping, number of mapped objects, COB-ID.
     ///
     /// # Errors
-    /// The first value that cannot be put into bytes.
+    /// The first value that cannot be put into bytes; the COB-ID of a PDO that changes, where it is not known.
     pub fn to_concise(&self, node_id: Option<u8>) -> Result<Vec<ConciseEntry>, ConciseValueError> {
         let node_id = node_id.or_else(|| self.node_id());
         let mut changes: BTreeMap<(u16, u8), Vec<u8>> = BTreeMap::new();
@@ -157,7 +157,7 @@ impl Device {
                 0x1600..=0x17FF | 0x1A00..=0x1BFF => Some(index - 0x200),
                 _ => None,
             };
-            let cob_id = pdo.and_then(|pdo| self.cob_id(pdo, node_id));
+            let cob_id = pdo.map(|pdo| self.cob_id(pdo, node_id)).transpose()?.flatten();
             match (pdo, cob_id) {
                 (Some(pdo), Some(cob_id)) => {
                     changes.insert((index, subindex), data);
@@ -190,12 +190,17 @@ impl Device {
         refused
     }
 
-    /// COB-ID that a PDO shall have in the end, from value or default.
-    fn cob_id(&self, pdo: u16, node_id: Option<u8>) -> Option<u32> {
-        let entry: &Entry =
-            self.entry(pdo, 1).filter(|entry| entry.access.is_some_and(super::types::Access::can_write))?;
-        let bytes = entry.value_bytes(node_id).or_else(|| entry.default_bytes(node_id))?.ok()?;
-        Some(u32::from_le_bytes(bytes.try_into().ok()?))
+    /// COB-ID that a PDO shall have in the end, from value or default; `None` where it cannot be written or
+    /// the file does not say it.
+    fn cob_id(&self, pdo: u16, node_id: Option<u8>) -> Result<Option<u32>, ConciseValueError> {
+        let writable = |entry: &&Entry| entry.access.is_some_and(super::types::Access::can_write);
+        let value = self
+            .entry(pdo, 1)
+            .filter(writable)
+            .and_then(|entry| entry.value_bytes(node_id).or_else(|| entry.default_bytes(node_id)));
+        let bytes =
+            value.transpose().map_err(|error| ConciseValueError { index: pdo, subindex: 1, error })?;
+        Ok(bytes.and_then(|bytes| Some(u32::from_le_bytes(bytes.try_into().ok()?))))
     }
 }
 
@@ -278,6 +283,16 @@ mod tests {
         }
         assert_eq!(other.apply_concise(&entries), []);
         assert_eq!(other.to_concise(Some(5)).unwrap(), entries);
+    }
+
+    /// Written while the PDO is in service, a mapping is refused, or changes what moves meanwhile.
+    #[test]
+    fn a_mapping_is_not_written_while_the_cob_id_is_unknown() {
+        let text = DCF.replace("[DeviceComissioning]\nNodeID=5\n", "");
+        let device = read(text.as_bytes()).unwrap().device;
+        let error = ConciseValueError { index: 0x1800, subindex: 1, error: ValueError::NeedsNodeId };
+        assert_eq!(device.to_concise(None), Err(error));
+        assert_eq!(device.to_concise(Some(5)).unwrap().len(), 7);
     }
 
     #[test]

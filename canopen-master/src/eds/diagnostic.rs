@@ -3,6 +3,8 @@
 use alloc::string::String;
 use core::fmt;
 
+use super::Format;
+
 /// How bad a finding is.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Hash)]
 pub enum Severity {
@@ -46,13 +48,23 @@ macro_rules! rules {
                 match self { $(Self::$name => Severity::$severity,)* }
             }
 
-            /// The clause that says how it should be.
-            #[must_use]
-            pub const fn clause(self) -> &'static str {
+            const fn eds_clause(self) -> &'static str {
                 match self { $(Self::$name => $clause,)* }
             }
         }
     };
+}
+
+impl Rule {
+    /// The clause that says how it should be in a file of this format.
+    #[must_use]
+    pub const fn clause(self, format: Format) -> &'static str {
+        match (format, self) {
+            (Format::Eds, _) | (Format::Xdd, Self::PdoMapping) => self.eds_clause(),
+            (Format::Xdd, Self::Mandatory) => "CiA 301, 7.5.2",
+            (Format::Xdd, _) => "CiA 311",
+        }
+    }
 }
 
 rules! {
@@ -128,6 +140,8 @@ pub struct Diagnostic {
     pub line: u32,
     /// What it is about.
     pub rule: Rule,
+    /// What the file is written in, by which the clause is.
+    pub format: Format,
     /// What was expected and what came, for people.
     pub message: String,
 }
@@ -138,14 +152,20 @@ impl Diagnostic {
     pub const fn severity(&self) -> Severity {
         self.rule.severity()
     }
+
+    /// The clause that says how it should be.
+    #[must_use]
+    pub const fn clause(&self) -> &'static str {
+        self.rule.clause(self.format)
+    }
 }
 
 impl fmt::Display for Diagnostic {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { line, rule, message } = self;
+        let Self { line, rule, message, .. } = self;
         if *line > 0 {
             write!(f, "line {line}: ")?;
         }
-        write!(f, "{}: {message} ({})", rule.severity(), rule.clause())
+        write!(f, "{}: {message} ({})", rule.severity(), self.clause())
     }
 }

@@ -36,7 +36,7 @@ pub use encoding::Encoding;
 pub use model::{Device, Entry, Fields, Module, Object, Section};
 pub use types::{Access, List, ObjectType, PdoMapping};
 pub use value::{Number, ValueError, fit, from_bytes, to_bytes};
-pub use writer::write_eds;
+pub use writer::{lost_in_eds, write_eds};
 pub use xdd::write_xdd;
 
 use reader::Findings;
@@ -202,8 +202,8 @@ pub fn read_as(bytes: &[u8], encoding: Encoding) -> Result<Reading, ReadError> {
     if let Some(offset) = bytes.iter().position(|byte| *byte == 0) {
         return Err(ReadError::Binary(offset));
     }
-    let mut findings = Findings::default();
     let format = if text.trim_start().starts_with('<') { Format::Xdd } else { Format::Eds };
+    let mut findings = Findings { list: Vec::new(), format };
     let device = match format {
         Format::Eds => {
             if !matches!(encoding, Encoding::Ascii) {
@@ -214,7 +214,7 @@ pub fn read_as(bytes: &[u8], encoding: Encoding) -> Result<Reading, ReadError> {
         }
         Format::Xdd => xdd::read(&text, &mut findings)?,
     };
-    let mut diagnostics = findings.0;
+    let mut diagnostics = findings.list;
     diagnostics.sort_by_key(|diagnostic| diagnostic.line);
     let text = match text {
         Cow::Borrowed(text) => text.into(),

@@ -22,9 +22,15 @@ const COMPACT_TEXT: usize = 64 << 20;
 #[derive(Default)]
 pub(crate) struct Builder<'a> {
     objects: BTreeMap<u16, Object>,
-    /// Line of the object's own section and its `SubNumber`.
-    declared: BTreeMap<u16, (u32, Option<i128>)>,
+    /// What the objects' own sections declare.
+    declared: BTreeMap<u16, Declared<'a>>,
     pending: Vec<(u16, Part, &'a Lines<'a>)>,
+}
+
+/// The last own section of an object, and what all of them say.
+struct Declared<'a> {
+    section: &'a Lines<'a>,
+    counts: Counts,
 }
 
 impl<'a> Builder<'a> {
@@ -33,18 +39,20 @@ impl<'a> Builder<'a> {
             self.pending.push((index, part, section));
             return;
         }
-        if let Some((first, _)) = self.declared.get(&index) {
-            repeated(section, *first, findings);
+        let mut counts = Counts::default();
+        if let Some(first) = self.declared.remove(&index) {
+            repeated(section, first.section.line, findings);
+            counts = first.counts;
         }
         let object = self.objects.entry(index).or_insert_with(|| Object::new(index));
-        let counts = read_entry(&mut object.own, section, true, findings);
-        object.compact = counts.compact.or(object.compact);
-        self.declared.insert(index, (section.line, counts.sub_number));
+        read_entry(&mut object.own, &mut counts, section, true, findings);
+        object.compact = counts.compact;
+        self.declared.insert(index, Declared { section, counts });
     }
 
     /// Line of an object's own section; 0 where it has none.
     pub(crate) fn line(&self, index: u16) -> u32 {
-        self.declared.get(&index).map_or(0, |(line, _)| *line)
+        self.declared.get(&index).map_or(0, |declared| declared.section.line)
     }
 
     /// The objects, and entries of lists that belong to no sub-object.
@@ -52,18 +60,18 @@ impl<'a> Builder<'a> {
         let mut pending = core::mem::take(&mut self.pending);
         // Sections of the same kind stay in the order of the file.
         pending.sort_by_key(|(index, part, _)| (*index, *part));
-        for (index, part, section) in &pending {
-            if let Part::Sub(subindex) = *part {
-                self.add_sub(*index, subindex, section, findings);
+        for same in pending.chunk_by(|one, next| (one.0, one.1) == (next.0, next.1)) {
+            if let [(index, Part::Sub(subindex), _), ..] = same {
+                self.add_sub(*index, *subindex, same, findings);
             }
         }
-        self.check_counts(findings);
+        self.check_declared(findings);
         let mut room = COMPACT_TEXT;
         for object in self.objects.values_mut() {
             let Some(count) = object.compact.filter(|count| *count > 0) else { continue };
             let needed = usize::from(count) * object.own.text_length();
             if needed > room {
-                let line = self.declared.get(&object.index).map_or(0, |(line, _)| *line);
+                let line = self.declared.get(&object.index).map_or(0, |declared| declared.section.line);
                 let message = format!(
                     "CompactSubObj={count} would repeat {} bytes; passed over",
                     object.own.text_length()
@@ -94,50 +102,51 @@ impl<'a> Builder<'a> {
         (core::mem::take(&mut self.objects).into_values().collect(), leftover)
     }
 
-    fn add_sub(&mut self, index: u16, subindex: u8, section: &Lines<'_>, findings: &mut Findings) {
+    /// Adds a sub-object: all sections of its name, mostly one.
+    fn add_sub(
+        &mut self,
+        index: u16,
+        subindex: u8,
+        sections: &[(u16, Part, &Lines<'_>)],
+        findings: &mut Findings,
+    ) {
+        let Some((_, _, last)) = sections.last() else { return };
         let object = self.objects.entry(index).or_insert_with(|| {
+            let line = sections.first().map_or(last.line, |(_, _, first)| first.line);
             let message = format!("there is no section [{index:04X}]; read as a RECORD without a name");
-            findings.add(section.line, Rule::Orphan, message);
+            findings.add(line, Rule::Orphan, message);
             let mut object = Object::new(index);
             object.own.object_type = ObjectType::RECORD;
             object
         });
-        // Sub-objects mostly come in ascending order.
-        let at = match object.subs.last() {
-            Some(last) if last.subindex >= subindex => {
-                object.subs.binary_search_by_key(&subindex, |entry| entry.subindex)
-            }
-            _ => Err(object.subs.len()),
-        };
-        let at = match at {
-            Ok(at) => {
+        let mut entry = Entry::new(subindex);
+        let mut counts = Counts::default();
+        for (at, (_, _, section)) in sections.iter().enumerate() {
+            if at > 0 {
                 repeated(section, 0, findings);
-                at
             }
-            Err(at) => {
-                object.subs.insert(at, Entry::new(subindex));
-                at
-            }
-        };
-        if let Some(entry) = object.subs.get_mut(at) {
-            read_entry(entry, section, false, findings);
+            read_entry(&mut entry, &mut counts, section, false, findings);
         }
+        missing(&entry, last, &counts, false, findings);
+        // They come in ascending order.
+        object.subs.push(entry);
     }
 
-    fn check_counts(&self, findings: &mut Findings) {
-        for (index, (line, sub_number)) in &self.declared {
+    fn check_declared(&self, findings: &mut Findings) {
+        for (index, Declared { section, counts }) in &self.declared {
             let Some(object) = self.objects.get(index) else { continue };
-            let described = object.subs.len();
-            match *sub_number {
+            missing(&object.own, section, counts, true, findings);
+            let (line, described) = (section.line, object.subs.len());
+            match counts.sub_number {
                 Some(number)
                     if i128::try_from(described) != Ok(number) && object.compact.unwrap_or(0) == 0 =>
                 {
                     let message = format!("SubNumber says {number}, sub-objects described: {described}");
-                    findings.add(*line, Rule::SubNumber, message);
+                    findings.add(line, Rule::SubNumber, message);
                 }
                 None if described > 0 && object.compact.unwrap_or(0) == 0 => {
                     findings.add(
-                        *line,
+                        line,
                         Rule::SubNumber,
                         format!("SubNumber is missing, sub-objects described: {described}"),
                     );
@@ -209,9 +218,11 @@ fn join(sections: &mut Vec<Section>, name: &str, fields: Fields) {
     }
 }
 
-/// Entries of an object's own section that count something.
+/// Keys seen, and entries of an object's own section that count something.
 #[derive(Default)]
 struct Counts {
+    /// One bit for each of [`KEYS`].
+    seen: u16,
     sub_number: Option<i128>,
     compact: Option<u8>,
 }
@@ -239,8 +250,13 @@ fn key_position(key: &str) -> Option<usize> {
     KEYS.iter().position(|known| known.len() == key.len() && known.eq_ignore_ascii_case(key))
 }
 
-fn read_entry(entry: &mut Entry, section: &Lines<'_>, own: bool, findings: &mut Findings) -> Counts {
-    let mut counts = Counts::default();
+fn read_entry(
+    entry: &mut Entry,
+    counts: &mut Counts,
+    section: &Lines<'_>,
+    own: bool,
+    findings: &mut Findings,
+) {
     let mut seen = 0_u16;
     for (line, key, value) in section.entries() {
         let Some(position) = key_position(key).filter(|position| own || *position < 12) else {
@@ -286,12 +302,12 @@ fn read_entry(entry: &mut Entry, section: &Lines<'_>, own: bool, findings: &mut 
             entry.other.set(key, value);
         }
     }
-    missing(entry, section, seen, own, findings);
-    counts
+    counts.seen |= seen;
 }
 
 /// What the kind of object needs (CiA 306-1, table 7).
-fn missing(entry: &Entry, section: &Lines<'_>, seen: u16, own: bool, findings: &mut Findings) {
+fn missing(entry: &Entry, section: &Lines<'_>, counts: &Counts, own: bool, findings: &mut Findings) {
+    let seen = counts.seen;
     let compact = own && seen & 1 << 13 != 0;
     let needs_value = matches!(entry.object_type, ObjectType::VAR) || compact;
     let needs = [(0, true), (2, needs_value), (3, needs_value)];

@@ -6,6 +6,7 @@ use alloc::format;
 use alloc::string::String;
 use alloc::vec::Vec;
 
+use super::Format;
 use super::diagnostic::{Diagnostic, Rule};
 use super::ini::{Document, LineKind, Section as Lines};
 use super::model::{Device, Fields, Module, Section, strip_prefix};
@@ -15,19 +16,23 @@ use super::types::List;
 use super::value::Number;
 
 /// Collects findings.
-#[derive(Debug, Default)]
-pub(crate) struct Findings(pub(crate) Vec<Diagnostic>);
+#[derive(Debug)]
+pub(crate) struct Findings {
+    pub(crate) list: Vec<Diagnostic>,
+    pub(crate) format: Format,
+}
 
 /// What nobody reads to the end; a file of nothing but damage would fill the memory.
 const MOST_FINDINGS: usize = 100_000;
 
 impl Findings {
     pub(crate) fn add(&mut self, line: u32, rule: Rule, message: impl Into<String>) {
-        match self.0.len() {
-            ..MOST_FINDINGS => self.0.push(Diagnostic { line, rule, message: message.into() }),
+        let format = self.format;
+        match self.list.len() {
+            ..MOST_FINDINGS => self.list.push(Diagnostic { line, rule, format, message: message.into() }),
             MOST_FINDINGS => {
                 let message = format!("more than {MOST_FINDINGS} findings; no more are listed");
-                self.0.push(Diagnostic { line, rule: Rule::Line, message });
+                self.list.push(Diagnostic { line, rule: Rule::Line, format, message });
             }
             _ => {}
         }

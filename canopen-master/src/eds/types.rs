@@ -134,6 +134,15 @@ impl Access {
     pub const fn can_write(self) -> bool {
         !matches!(self, Self::ReadOnly | Self::Const)
     }
+
+    /// Whether a value that may be mapped goes into RPDOs (`receive`) or TPDOs.
+    pub(crate) const fn goes_into(self, receive: bool) -> bool {
+        match self {
+            Self::ReadWrite => true,
+            Self::ReadOnly | Self::Const | Self::ReadWriteInput => !receive,
+            Self::WriteOnly | Self::ReadWriteOutput => receive,
+        }
+    }
 }
 
 words! {

@@ -9,10 +9,11 @@ use alloc::vec::Vec;
 use super::model::{Device, Entry, Fields, Module, Object, Section};
 use super::name::{ModulePart, Name, Part};
 use super::objects::KEYS;
-use super::types::{List, PdoMapping};
+use super::types::{Access, List, PdoMapping};
 
 /// Writes a file anew: sections in the order of the standard, objects by list and index, lines ended
-/// by CR LF. Reading it gives the same device. An EDS becomes a DCF by what the device holds.
+/// by CR LF. Reading it gives the same device, but for [`lost_in_eds`]. An EDS becomes a DCF by what the
+/// device holds.
 #[must_use]
 pub fn write_eds(device: &Device) -> String {
     let mut text = String::new();
@@ -21,6 +22,59 @@ pub fn write_eds(device: &Device) -> String {
         text.push_str("\r\n");
     }
     text
+}
+
+/// What only XML has a place for, in words: entries without access, directions of PDOs that no `AccessType`
+/// says, mappings by default, line ends.
+#[must_use]
+pub fn lost_in_eds(device: &Device) -> Vec<String> {
+    let mut lost = Vec::new();
+    for object in &device.objects {
+        for entry in object.entries() {
+            let place = format!("{:04X}h:{:02X}", object.index, entry.subindex);
+            if entry.access.is_none() && entry.data_type.is_some() {
+                lost.push(format!("that {place} has no access: it is written without AccessType"));
+            }
+            if let Some(mapping) = entry.pdo_mapping.filter(|mapping| !says(written_access(entry), *mapping))
+            {
+                lost.push(format!("PDOmapping=\"{mapping}\" of {place}: it is written as mappable"));
+            }
+            let texts = [
+                ("DefaultValue", &entry.default),
+                ("ParameterValue", &entry.value),
+                ("Denotation", &entry.denotation),
+            ];
+            for (key, _) in
+                texts.iter().filter(|(_, text)| text.iter().any(|text| text.contains(['\r', '\n'])))
+            {
+                lost.push(format!("line ends in {key} of {place}: blanks stand for them"));
+            }
+        }
+    }
+    lost
+}
+
+/// The access as an EDS has it: there, it tells into which PDOs a value may go.
+fn written_access(entry: &Entry) -> Option<Access> {
+    match (entry.access, entry.pdo_mapping) {
+        (Some(Access::ReadWrite), Some(PdoMapping::Rpdo)) => Some(Access::ReadWriteOutput),
+        (Some(Access::ReadWrite), Some(PdoMapping::Tpdo)) => Some(Access::ReadWriteInput),
+        (access, _) => access,
+    }
+}
+
+/// Whether `PDOMapping` of 0 or 1 and this access say as much as the mapping does.
+const fn says(access: Option<Access>, mapping: PdoMapping) -> bool {
+    match mapping {
+        PdoMapping::No | PdoMapping::Optional => true,
+        PdoMapping::Default => false,
+        PdoMapping::Rpdo => goes_only(access, true),
+        PdoMapping::Tpdo => goes_only(access, false),
+    }
+}
+
+const fn goes_only(access: Option<Access>, receive: bool) -> bool {
+    matches!(access, Some(access) if access.goes_into(receive) && !access.goes_into(!receive))
 }
 
 pub(super) fn put_section(text: &mut String, section: &Section, end: &str) {
@@ -252,7 +306,7 @@ fn entry_fields(entry: &Entry) -> Vec<(String, String)> {
         Some(entry.name.clone()),
         Some(format!("0x{:X}", entry.object_type.0)),
         entry.data_type.map(|data_type| format!("0x{:04X}", data_type.0)),
-        entry.access.map(|access| access.word().to_owned()),
+        written_access(entry).map(|access| access.word().to_owned()),
         entry.default.clone(),
         mapping,
         entry.low_limit.clone(),

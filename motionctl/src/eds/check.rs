@@ -17,7 +17,7 @@ pub(super) fn run(out: &Output, input: &Input, lenient: bool, strict: bool) -> R
             let refused = json!({ "line": line, "severity": "error", "rule": "refused", "clause": null, "message": error.to_string() });
             let document = json!({ "file": name, "format": null, "refused": true, "diagnostics": [refused] });
             out.document(document, || println!("{name}: refused: {error}"));
-            return Err(Exit::check(format!("{name}: {error}")));
+            return Err(Exit::check(format!("{name}: 1 error")));
         }
     };
     let diagnostics = if lenient { reading.diagnostics.clone() } else { eds::check(&reading) };
@@ -51,7 +51,7 @@ pub(super) fn run(out: &Output, input: &Input, lenient: bool, strict: bool) -> R
 
 /// As compilers say it, so that editors find the place.
 fn line(name: &str, diagnostic: &Diagnostic) -> String {
-    let Diagnostic { line, rule, message } = diagnostic;
+    let Diagnostic { line, rule, message, .. } = diagnostic;
     let place = if *line > 0 { format!("{name}:{line}") } else { name.to_owned() };
-    format!("{place}: {}: {message} [{}, {}]\n", rule.severity(), rule.word(), rule.clause())
+    format!("{place}: {}: {message} [{}, {}]\n", rule.severity(), rule.word(), diagnostic.clause())
 }

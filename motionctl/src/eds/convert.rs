@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use canopen_master::eds::{self, Device, Format, Reading};
+use canopen_master::eds::{self, Device, Format, Reading, ValueError};
 use serde_json::json;
 
 use super::cli::{Input, Kind};
@@ -16,6 +16,12 @@ pub(super) struct Changes<'a> {
     pub(super) values: &'a [String],
     pub(super) concise: Option<&'a Path>,
     pub(super) anew: bool,
+}
+
+impl Changes<'_> {
+    const fn configures(&self) -> bool {
+        self.node.is_some() || self.bit_rate.is_some() || !self.values.is_empty() || self.concise.is_some()
+    }
 }
 
 pub(super) fn run(
@@ -34,10 +40,23 @@ pub(super) fn run(
     if !reading.diagnostics.is_empty() {
         out.remark(super::doubts(&reading));
     }
+    if !kind.is_configuration() && changes.configures() {
+        return Err(Exit::usage(format!(
+            "{} describes a kind of device and holds no configured values (CiA 306-1, 7; CiA 311): --node, --bit-rate, \
+             --set and --concise need a .dcf, .xdc or .bin",
+            output.display()
+        )));
+    }
     let mut device = reading.device.clone();
     configure(out, &mut device, changes)?;
     if !kind.is_configuration() && device.is_configuration() {
-        unconfigure(out, &mut device);
+        if Kind::of(&input.file) == Some(kind) {
+            out.remark(
+                "the file holds what is configured in a device, which a description should not: it is kept",
+            );
+        } else {
+            unconfigure(out, &mut device);
+        }
     }
     let (written, lost) = render(&reading, &device, kind, changes)?;
     for what in &lost {
@@ -129,7 +148,10 @@ fn render(
         Kind::Eds | Kind::Dcf => Format::Eds,
         Kind::Xdd | Kind::Xdc => Format::Xdd,
         Kind::Concise => {
-            let entries = device.to_concise(None).map_err(|error| Exit::check(error.to_string()))?;
+            let entries = device.to_concise(None).map_err(|error| {
+                let node = if error.error == ValueError::NeedsNodeId { ": give it by --node N" } else { "" };
+                Exit::check(format!("{error}{node}"))
+            })?;
             return Ok((eds::encode_concise(&entries), Vec::new()));
         }
     };
@@ -137,23 +159,10 @@ fn render(
         return Ok((reading.source.encode(&reading.update(device)), Vec::new()));
     }
     Ok(match format {
-        Format::Eds => (reading.source.encode(&eds::write_eds(device)), without_access(device)),
+        Format::Eds => (reading.source.encode(&eds::write_eds(device)), eds::lost_in_eds(device)),
         Format::Xdd => {
             let (text, lost) = eds::write_xdd(device);
             (text.into_bytes(), lost)
         }
     })
-}
-
-/// Entries that nobody may access, as `noAccess` of an XDD says: an EDS has no AccessType for that.
-fn without_access(device: &Device) -> Vec<String> {
-    let entries =
-        device.objects.iter().flat_map(|object| object.entries().iter().map(|entry| (object.index, entry)));
-    entries
-        .filter(|(_, entry)| entry.access.is_none() && entry.data_type.is_some())
-        .map(|(index, entry)| {
-            let sub = entry.subindex;
-            format!("that {index:04X}h:{sub:02X} has no access: it is written without AccessType")
-        })
-        .collect()
 }

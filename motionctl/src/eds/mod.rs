@@ -88,7 +88,7 @@ fn diagnostic_json(diagnostic: &eds::Diagnostic) -> Value {
         "line": diagnostic.line,
         "severity": diagnostic.severity().to_string(),
         "rule": diagnostic.rule.word(),
-        "clause": diagnostic.rule.clause(),
+        "clause": diagnostic.clause(),
         "message": diagnostic.message,
     })
 }

@@ -155,13 +155,14 @@ pub(super) fn check(device: &Device, places: &Places<'_>, findings: &mut Finding
             add(key, format!("{key} is {info:#X}, 1018h:0{subindex} says {:#X}", object.value));
         }
     }
+    let compact = info.flag("CompactPDO");
     for (key, base) in [("NrOfRXPDO", 0x1400_u16), ("NrOfTXPDO", 0x1800)] {
         let described = device.objects.iter().filter(|object| object.index & !0x1FF == base).count();
-        let declared = info.number(key);
-        if declared
-            .is_some_and(|declared| i128::try_from(described).is_ok_and(|described| described > declared))
-        {
-            add(key, format!("{key} says {}, described are {described}", declared.unwrap_or_default()));
+        let described = i128::try_from(described).unwrap_or(i128::MAX);
+        // CompactPDO implies those that are not described.
+        let fits = |declared| described == declared || (compact && described < declared);
+        if let Some(declared) = info.number(key).filter(|declared| !fits(*declared)) {
+            add(key, format!("{key} says {declared}, described are {described}"));
         }
     }
     for (key, value) in device.dummy_usage.iter() {

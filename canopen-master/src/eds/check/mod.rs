@@ -11,20 +11,21 @@ use alloc::vec::Vec;
 use super::diagnostic::{Diagnostic, Rule};
 use super::ini::{Document, LineKind, Section};
 use super::model::Device;
-use super::name::{Name, Part};
+use super::name::{ModulePart, Name, Part};
 use super::reader::Findings;
 use super::{Format, Reading, xdd};
 
 /// What reading found, and every other violation of the standard, by line.
 #[must_use]
 pub fn check(reading: &Reading) -> Vec<Diagnostic> {
-    let mut findings = Findings(reading.diagnostics.clone());
+    let mut findings = Findings { list: reading.diagnostics.clone(), format: reading.source.format };
     let device = &reading.device;
     let text = reading.source.text.as_str();
     match reading.source.format {
         Format::Eds => {
             let document = Document::parse(text);
             layout(&document, &mut findings);
+            numbering(&document, &mut findings);
             let places = Places::of_document(&document);
             header::check(device, &places, &mut findings);
             header::check_commissioning(device, &places, &mut findings);
@@ -36,7 +37,7 @@ pub fn check(reading: &Reading) -> Vec<Diagnostic> {
             contents(device, &places, &mut findings);
         }
     }
-    let mut diagnostics = findings.0;
+    let mut diagnostics = findings.list;
     diagnostics.sort_by_key(|diagnostic| diagnostic.line);
     diagnostics
 }
@@ -51,8 +52,8 @@ fn contents(device: &Device, places: &Places<'_>, findings: &mut Findings) {
 struct Places<'a> {
     /// Line of the section or element of an object (`None`) or sub-object.
     lines: BTreeMap<(u16, Option<u8>), u32>,
-    /// The section itself, where the file has sections.
-    sections: BTreeMap<(u16, Option<u8>), &'a Section<'a>>,
+    /// The sections themselves, where the file has sections: mostly one.
+    sections: BTreeMap<(u16, Option<u8>), Vec<&'a Section<'a>>>,
     /// Sections that are no objects, by upper-case name.
     named: BTreeMap<String, &'a Section<'a>>,
 }
@@ -74,7 +75,7 @@ impl<'a> Places<'a> {
                 }
             };
             places.lines.insert(key, section.line);
-            places.sections.insert(key, section);
+            places.sections.entry(key).or_default().push(section);
         }
         places
     }
@@ -83,8 +84,8 @@ impl<'a> Places<'a> {
     /// object where the sub-object has no section of its own.
     fn line(&self, index: u16, subindex: Option<u8>, key: &str) -> u32 {
         let keys = [(index, subindex), (index, None)];
-        let section = keys.iter().find_map(|at| self.sections.get(at));
-        let line = section.and_then(|section| section.entry(key)).map(|(line, _)| line);
+        let sections = keys.iter().find_map(|at| self.sections.get(at)).into_iter().flatten();
+        let line = sections.rev().find_map(|section| section.entry(key)).map(|(line, _)| line);
         line.or_else(|| keys.iter().find_map(|at| self.lines.get(at).copied())).unwrap_or_default()
     }
 
@@ -107,6 +108,27 @@ fn layout(document: &Document<'_>, findings: &mut Findings) {
         }
         if line.kind == LineKind::Comment && line.raw.trim_start().starts_with('#') {
             findings.add(line.number, Rule::Line, "a comment begins with ;, not with #");
+        }
+    }
+}
+
+/// Entries of lists are numbered from 1 without a gap; other readers take the first ones, as many as the
+/// count says.
+fn numbering(document: &Document<'_>, findings: &mut Findings) {
+    for section in &document.sections {
+        let rule = match Name::parse(section.name) {
+            Name::List(_) => Rule::ListCount,
+            Name::Object(_, Part::Links) => Rule::Links,
+            Name::Module(_, ModulePart::FixedObjects | ModulePart::SubExtends) => Rule::Modules,
+            _ => continue,
+        };
+        let numbers: BTreeMap<u32, u32> =
+            section.entries().filter_map(|(line, key, _)| Some((key.parse().ok()?, line))).collect();
+        let gap = (1..).zip(&numbers).find(|(expected, (number, _))| expected != *number);
+        if let Some((expected, (number, line))) = gap {
+            let message =
+                alloc::format!("entry {number} of [{}] stands where {expected} should", section.name);
+            findings.add(*line, rule, message);
         }
     }
 }
@@ -156,7 +178,7 @@ mod tests {
 
     #[test]
     fn every_mutation_is_found_with_its_rule() {
-        let cases: [(&str, &str, Rule); 44] = [
+        let cases: [(&str, &str, Rule); 47] = [
             ("[FileInfo]", "[FileInfos]", Rule::MissingSection),
             ("EDSVersion=4.0", "EDSVersion=four", Rule::FileInfo),
             ("FileVersion=1\n", "", Rule::FileInfo),
@@ -177,6 +199,9 @@ mod tests {
             ("[1001]", "[1002]", Rule::Mandatory),
             ("[1018sub1]", "[1018sub1", Rule::Line),
             ("[1018sub1]", "[1019sub1]", Rule::Orphan),
+            ("3=0x1018", "4=0x1018", Rule::ListCount),
+            ("NrOfRXPDO=1", "NrOfRXPDO=2", Rule::DeviceInfo),
+            ("NrOfTXPDO=0", "NrOfTXPDO=1", Rule::DeviceInfo),
             ("SubNumber=2", "SubNumber=9", Rule::SubNumber),
             ("ParameterName=Speed\n", "", Rule::MissingEntry),
             ("DataType=0x0003\n", "", Rule::MissingEntry),
@@ -215,6 +240,40 @@ mod tests {
         assert!(found.iter().any(|finding| finding.rule == Rule::NameLength));
     }
 
+    /// The PDOs that `CompactPDO` implies need no description; a gap is told where it is.
+    #[test]
+    fn counts_of_pdos_and_numbers_of_lists() {
+        let more = GOOD.replacen("NrOfRXPDO=1", "NrOfRXPDO=3", 1);
+        assert!(findings(&more)[0].contains("NrOfRXPDO says 3, described are 1"), "{:?}", findings(&more));
+        let compact = more.replacen("LSS_Supported=0", "LSS_Supported=0\nCompactPDO=0x3", 1);
+        assert_eq!(findings(&compact), [""; 0]);
+        let gap = GOOD.replacen("2=0x1001\n3=0x1018", "3=0x1001\n4=0x1018", 1);
+        let found = findings(&gap);
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert!(found[0].contains("entry 3 of [MandatoryObjects] stands where 2 should"), "{found:?}");
+    }
+
+    /// What the sections of one object say together is not missing in each.
+    #[test]
+    fn sections_that_are_joined_need_each_key_once() {
+        let split = |from: &str, name: &str, keys: &str| {
+            let text = GOOD.replacen(from, &alloc::format!("{from}[{name}]\nParameterName=again\n{keys}"), 1);
+            assert_ne!(text, GOOD);
+            findings(&text)
+        };
+        let joined = split("DefaultValue=0x191\nPDOMapping=0\n", "1000", "");
+        assert_eq!(joined.len(), 1, "{joined:#?}");
+        assert!(joined[0].contains("[1000] is there already"), "{joined:#?}");
+        // The number of sub-objects may stand in the first section, and a key in the second one.
+        let joined = split("ObjectType=0x9\nSubNumber=2\n", "1018", "");
+        assert_eq!(joined.len(), 1, "{joined:#?}");
+        let joined = split("DefaultValue=1\nPDOMapping=0\n", "1018sub0", "");
+        assert_eq!(joined.len(), 1, "{joined:#?}");
+        let text = GOOD.replacen("AccessType=rww\n", "", 1);
+        assert!(findings(&text)[0].contains("[2000] has no AccessType"));
+        assert_eq!(findings(&(text + "[2000]\nAccessType=rww\n")).len(), 1);
+    }
+
     /// As editors write it into every DCF: the defaults stay what the device has.
     #[test]
     fn an_empty_parameter_value_hides_no_mapping() {
@@ -230,7 +289,7 @@ mod tests {
         let found = mapping(&read_only);
         assert_eq!(found.len(), 1, "{found:?}");
         assert!(
-            found[0].contains("1600h:02 maps 20000010h: with its AccessType it goes into TPDOs only"),
+            found[0].contains("1600h:02 maps 20000010h: its access is ro, which goes into TPDOs only"),
             "{found:?}"
         );
     }

@@ -5,7 +5,7 @@ use alloc::format;
 use super::super::diagnostic::Rule;
 use super::super::model::{Device, Entry, Object};
 use super::super::reader::Findings;
-use super::super::types::{Access, PdoMapping, length_in_bits};
+use super::super::types::{PdoMapping, length_in_bits};
 use super::super::value::Number;
 use super::Places;
 use crate::data_type::DataType;
@@ -67,22 +67,17 @@ fn one(device: &Device, mapped: u32, receive: bool) -> Result<(), alloc::string:
     let Some(entry) = device.entry(index, subindex) else {
         return Err(format!("there is no {index:04X}h:{subindex:02X}"));
     };
-    let refusal = match (entry.pdo_mapping, receive) {
-        (None | Some(PdoMapping::No), _) => Some("its PDOMapping allows none"),
-        (Some(PdoMapping::Tpdo), true) => Some("its PDOMapping allows TPDOs only"),
-        (Some(PdoMapping::Rpdo), false) => Some("its PDOMapping allows RPDOs only"),
-        _ => match (entry.access, receive) {
-            (Some(Access::ReadOnly | Access::Const | Access::ReadWriteInput), true) => {
-                Some("with its AccessType it goes into TPDOs only")
-            }
-            (Some(Access::WriteOnly | Access::ReadWriteOutput), false) => {
-                Some("with its AccessType it goes into RPDOs only")
-            }
-            _ => None,
-        },
-    };
-    if let Some(refusal) = refusal {
-        return Err(refusal.into());
+    match entry.pdo_mapping.unwrap_or(PdoMapping::No) {
+        PdoMapping::No => return Err("its PDOMapping allows none".into()),
+        PdoMapping::Tpdo if receive => return Err("its PDOMapping allows TPDOs only".into()),
+        PdoMapping::Rpdo if !receive => return Err("its PDOMapping allows RPDOs only".into()),
+        _ => {}
+    }
+    if let Some(access) = entry.access.filter(|access| !access.goes_into(receive)) {
+        return Err(format!(
+            "its access is {access}, which goes into {} only",
+            if receive { "TPDOs" } else { "RPDOs" }
+        ));
     }
     let length = entry.data_type.and_then(|data_type| length_in_bits(device.base_type(data_type)));
     match length {

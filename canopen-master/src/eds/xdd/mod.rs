@@ -136,6 +136,58 @@ mod tests {
         )
     }
 
+    #[test]
+    fn findings_quote_the_standard_of_xml() {
+        let object = "<CANopenObject index=\"1000\" name=\"a\" dataType=\"0005\" accessType=\"ro\" defaultValue=\"256\" />";
+        let found = super::super::check(&read(file(object, "").as_bytes()).unwrap());
+        let clauses: alloc::vec::Vec<_> = found.iter().map(|finding| finding.clause()).collect();
+        assert_eq!(clauses, ["CiA 301, 7.5.2", "CiA 301, 7.5.2", "CiA 311"], "{found:?}");
+    }
+
+    /// Into which PDOs a value may go is said by the access where an EDS has a word for it.
+    #[test]
+    fn pdo_directions_get_into_an_eds_or_are_told() {
+        let cases = [
+            ("rw", "RPDO", "rww", ""),
+            ("rw", "TPDO", "rwr", ""),
+            ("ro", "TPDO", "ro", ""),
+            ("wo", "RPDO", "wo", ""),
+            ("rw", "optional", "rw", ""),
+            ("rw", "no", "rw", ""),
+            ("ro", "RPDO", "ro", "PDOmapping=\"RPDO\" of 2000h:00: it is written as mappable"),
+            ("rw", "default", "rw", "PDOmapping=\"default\" of 2000h:00: it is written as mappable"),
+        ];
+        for (access, mapping, written, lost) in cases {
+            let object = format!(
+                "<CANopenObject index=\"2000\" name=\"a\" dataType=\"0005\" accessType=\"{access}\" PDOmapping=\"{mapping}\" />"
+            );
+            let device = read(file(&object, "").as_bytes()).unwrap().device;
+            let text = super::super::write_eds(&device);
+            assert!(text.contains(&format!("AccessType={written}\r\n")), "{access} {mapping}: {text}");
+            assert!(text.contains(&format!("PDOMapping={}\r\n", u8::from(mapping != "no"))), "{text}");
+            assert_eq!(super::super::lost_in_eds(&device).join(""), lost, "{access} {mapping}");
+        }
+    }
+
+    /// XML makes blanks of tabs and line ends as they are, not of those that character references give.
+    #[test]
+    fn character_references_survive_in_values() {
+        let object = "<CANopenObject index=\"2000\" name=\"a\" dataType=\"0009\" defaultValue=\"tab&#9;and\tline&#10;end\" \
+            uniqueIDRef=\"P\" /><parameter uniqueID=\"P\"><actualValue value=\"x&#x9;y\" /></parameter>";
+        let device = read(file(object, "").as_bytes()).unwrap().device;
+        let own = &device.object(0x2000).unwrap().own;
+        assert_eq!(own.default.as_deref(), Some("tab\tand line\nend"));
+        assert_eq!(own.value.as_deref(), Some("x\ty"));
+        assert_eq!(read(write_xdd(&device).0.as_bytes()).unwrap().device, device);
+        // An EDS has a place for the tab, none for the line's end.
+        let eds = read(super::super::write_eds(&device).as_bytes()).unwrap().device;
+        assert_eq!(eds.object(0x2000).unwrap().own.default.as_deref(), Some("tab\tand line end"));
+        assert_eq!(
+            super::super::lost_in_eds(&device),
+            ["line ends in DefaultValue of 2000h:00: blanks stand for them"]
+        );
+    }
+
     /// Found by fuzzing: blanks that XML takes from such a value made it another one when written.
     #[test]
     fn a_truth_value_may_have_blanks_around_it() {

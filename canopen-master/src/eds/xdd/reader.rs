@@ -228,6 +228,11 @@ fn bit_rate(text: &str) -> Option<u32> {
     }
 }
 
+/// The value of an attribute: what XML has made of it, so that what character references give stays.
+fn value_text(text: &str) -> String {
+    text.trim().to_owned()
+}
+
 /// A text on one line.
 fn squeeze(text: &str) -> String {
     text.split(['\n', '\r', '\t'])
@@ -319,11 +324,11 @@ fn entry(
                 Ok(flags) => entry.flags = Some(flags),
                 Err(_) => bad("hexadecimal number"),
             },
-            "defaultValue" => entry.default = Some(squeeze(value)),
-            "lowLimit" => entry.low_limit = Some(squeeze(value)),
-            "highLimit" => entry.high_limit = Some(squeeze(value)),
-            "actualValue" => entry.value = Some(squeeze(value)),
-            "denotation" => entry.denotation = Some(squeeze(value)),
+            "defaultValue" => entry.default = Some(value_text(value)),
+            "lowLimit" => entry.low_limit = Some(value_text(value)),
+            "highLimit" => entry.high_limit = Some(value_text(value)),
+            "actualValue" => entry.value = Some(value_text(value)),
+            "denotation" => entry.denotation = Some(value_text(value)),
             _ => {}
         }
     }
@@ -355,7 +360,7 @@ fn complete(
     context: &Context<'_, '_>,
 ) {
     let line = context.lines.line(parameter);
-    let value = |node: Option<Node<'_, '_>>| node.and_then(|node| attribute(node, "value")).map(squeeze);
+    let value = |node: Option<Node<'_, '_>>| node.and_then(|node| attribute(node, "value")).map(value_text);
     let simple = parameter.children().find_map(|child| {
         let name = child.tag_name().name();
         TYPES.iter().find(|(known, _)| *known == name).map(|(_, data_type)| *data_type)
@@ -404,7 +409,7 @@ fn complete(
             findings.add(context.lines.line(property), Rule::Xdd, "property without name and value");
             continue;
         };
-        let (name, value) = (squeeze(name), squeeze(value));
+        let (name, value) = (squeeze(name), value_text(value));
         if name.eq_ignore_ascii_case("ParameterRefName") {
             entry.ref_name = Some(value);
         } else if is_key(&name) {
