@@ -57,8 +57,8 @@ impl FileNode {
                 add(&mut objects, object.index, 0, &device, &object.own, id);
             }
         }
-        let rpdos = core::array::from_fn(|number| slot(&device, 0x1400, 0x200, number as u16, id));
-        let tpdos = core::array::from_fn(|number| slot(&device, 0x1800, 0x180, number as u16, id));
+        let rpdos = core::array::from_fn(|number| slot(&device, 0x1400, number as u16, id));
+        let tpdos = core::array::from_fn(|number| slot(&device, 0x1800, number as u16, id));
         Ok(Node::new(Settings { node, identity }, Self, objects, Pdos::new(rpdos, tpdos)))
     }
 }
@@ -69,8 +69,8 @@ fn value(entry: &eds::Entry, node: Option<u8>) -> Option<Vec<u8>> {
 }
 
 /// PDO `number` (from 0) as the file says, off where it says nothing. `index`: of the communication
-/// parameters of PDO 0; `base`: its identifier in the predefined connection set.
-fn slot(device: &eds::Device, index: u16, base: u32, number: u16, node: Option<u8>) -> Slot {
+/// parameters of PDO 0.
+fn slot(device: &eds::Device, index: u16, number: u16, node: Option<u8>) -> Slot {
     const MAPPING: u16 = 0x200;
     let read = |entry: &eds::Entry, node| {
         Some(value(entry, node)?.iter().take(4).rev().fold(0, |value, &byte| value << 8 | u32::from(byte)))
@@ -81,8 +81,7 @@ fn slot(device: &eds::Device, index: u16, base: u32, number: u16, node: Option<u
     if let Some(entry) = device.entry(index + number, 1) {
         // Without an address yet, what depends on it can only be the predefined one.
         let raw = read(entry, node).or_else(|| Some(read(entry, Some(1))? & 0xE000_0000)).unwrap_or(0);
-        let predefined = base + 0x100 * u32::from(number) + node.map_or(0, u32::from);
-        own.cob_id = CobId(if raw & 0x1FFF_FFFF == predefined { raw & 0xE000_0000 } else { raw });
+        own.cob_id = CobId(raw);
     }
     let transmission = number_at(index, 2).and_then(|raw| Transmission::new(raw as u8).ok());
     own.transmission = transmission.unwrap_or(own.transmission);

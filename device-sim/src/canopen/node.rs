@@ -6,13 +6,16 @@ use canopen_master::lss::{self, BitTiming, Identity};
 use canopen_master::nmt::State;
 use canopen_master::slave::{Config, Event, Slave};
 use canopen_master::{guarding, heartbeat, od};
-use pdo::{Address, CobId, Frame, NodeId, Payload, Transmission, cob};
+use pdo::{Address, CobId, Communication, Frame, NodeId, Payload, Transmission, cob};
 
-use super::common::{MAPPED, PDOS};
+use super::common::{MAPPED, PDOS, Slot};
 use super::dictionary::Dictionary;
 use super::objects::Objects;
 use super::{Context, Device, Error, Pdos};
 use crate::can;
+
+/// The identifier in a COB-ID.
+const IDENTIFIER: u32 = 0x1FFF_FFFF;
 
 /// What a node is set to before it starts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -52,12 +55,15 @@ pub struct Node<D> {
 
 impl<D: Device> Node<D> {
     /// A node that has not started yet. An identifier of 0 in `pdos` stands for that of the predefined
-    /// connection set.
+    /// connection set; one that is that of `settings.node` follows another address as well.
     #[must_use]
     pub fn new(settings: Settings, device: D, objects: Objects, pdos: Pdos) -> Self {
         let rates: Vec<_> = (0..=8).filter_map(BitTiming::from_index).collect();
         let config = Config { bit_rates: &rates, ..Config::new(settings.identity, settings.node) };
-        let factory = Image { objects: objects.clone(), pdos: pdos.clone() };
+        let mut factory = Image { objects: objects.clone(), pdos: pdos.clone() };
+        if let Some(node) = settings.node {
+            factory.leave(node);
+        }
         let dictionary = Dictionary::new(device, objects);
         let slave = Slave::new(&config, od::Objects { dictionary, pdos });
         Self { slave, factory, stored: None, started: false, sent: [None; PDOS] }
@@ -218,7 +224,11 @@ impl<D: Device> Node<D> {
         match at.index {
             0x1010 => {
                 let od::Objects { dictionary, pdos } = self.slave.objects();
-                self.stored = Some(Image { objects: dictionary.objects.clone(), pdos: pdos.clone() });
+                let mut image = Image { objects: dictionary.objects.clone(), pdos: pdos.clone() };
+                if let Some(node) = self.node() {
+                    image.leave(node);
+                }
+                self.stored = Some(image);
             }
             // The factory's values come back with the next start (CiA 301, 7.5.2.14).
             0x1011 => self.stored = None,
@@ -295,20 +305,35 @@ impl Image {
         let id = u32::from(node.raw());
         self.objects.set(0x1014, 0, i128::from(u32::from(cob::EMCY) + id));
         self.objects.set(0x100B, 0, i128::from(id));
-        let own = |cob_id: CobId, base: u32, number: usize| match cob_id.0 & 0x1FFF_FFFF {
-            0 => CobId(cob_id.0 | (base + 0x100 * number as u32 + id)),
+        self.identifiers(node, |cob_id, predefined| match cob_id & IDENTIFIER {
+            0 => cob_id | predefined,
             _ => cob_id,
-        };
-        for number in 0..PDOS {
-            let (Some(&(mut rpdo)), Some(&(mut tpdo))) =
-                (self.pdos.rpdo_slots().get(number), self.pdos.tpdo_slots().get(number))
-            else {
-                continue;
+        });
+    }
+
+    /// The opposite of [`follow`](Self::follow), so that what is kept goes on to follow the address.
+    fn leave(&mut self, node: NodeId) {
+        self.identifiers(node, |cob_id, predefined| match cob_id & IDENTIFIER {
+            own if own == predefined => cob_id & !IDENTIFIER,
+            _ => cob_id,
+        });
+    }
+
+    /// Changes the identifiers of all PDOs; `change` gets one and that of the predefined connection set.
+    fn identifiers(&mut self, node: NodeId, change: impl Fn(u32, u32) -> u32) {
+        let id = u32::from(node.raw());
+        for (number, offset) in (0..PDOS).zip((0..).step_by(0x100)) {
+            let changed = |slot: &Slot, base: u32| {
+                let CobId(own) = slot.communication.cob_id;
+                let cob_id = CobId(change(own, base + offset + id));
+                Slot { communication: Communication { cob_id, ..slot.communication }, ..*slot }
             };
-            rpdo.communication.cob_id = own(rpdo.communication.cob_id, 0x200, number);
-            tpdo.communication.cob_id = own(tpdo.communication.cob_id, 0x180, number);
-            self.pdos.set_rpdo_slot(number, rpdo);
-            self.pdos.set_tpdo_slot(number, tpdo);
+            if let Some(slot) = self.pdos.rpdo_slots().get(number).map(|slot| changed(slot, 0x200)) {
+                self.pdos.set_rpdo_slot(number, slot);
+            }
+            if let Some(slot) = self.pdos.tpdo_slots().get(number).map(|slot| changed(slot, 0x180)) {
+                self.pdos.set_tpdo_slot(number, slot);
+            }
         }
     }
 }

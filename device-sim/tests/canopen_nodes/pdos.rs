@@ -182,6 +182,19 @@ fn identifiers_follow_the_address() {
     assert_eq!(bench.heard(), ["089#1082110016010000"]);
 }
 
+/// 1010h keeps that an identifier is the predefined one, and any other as it is.
+#[test]
+fn stored_identifiers_follow_the_address_too() {
+    let mut bench = Bench::new(RemoteIo::node(id(5), 1, false), Faults::NONE);
+    bench.put(0x1400, 1, &0x8000_0205u32.to_le_bytes());
+    bench.put(0x1400, 1, &0x333u32.to_le_bytes());
+    bench.put(0x1010, 1, b"save");
+    readdress(&mut bench, 5, 9);
+    assert_eq!(bench.heard(), ["189#00"]);
+    bench.send(Frame::standard(0x333, [0x3C]));
+    assert_eq!(bench.node.device().outputs(), 0x3C);
+}
+
 const FILE: &str = "
 [DeviceInfo]
 VendorName=Nobody
