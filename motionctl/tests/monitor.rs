@@ -30,6 +30,10 @@ struct Seat {
 
 impl Seat {
     fn new(bench: &Bench, arguments: &[&str], size: (u16, u16)) -> Self {
+        Self::with(bench, arguments, size, &[])
+    }
+
+    fn with(bench: &Bench, arguments: &[&str], size: (u16, u16), environment: &[(&str, &str)]) -> Self {
         let link = bench.path("TERMINAL");
         let person = open(&format!("pty:{}", link.display()).parse().unwrap(), Role::Device).unwrap();
         let terminal = File::options().read(true).write(true).open(link).unwrap();
@@ -40,6 +44,7 @@ impl Seat {
         let child = bench
             .command(arguments)
             .env_remove("NO_COLOR")
+            .envs(environment.iter().copied())
             .stdin(end())
             .stdout(end())
             .stderr(end())
@@ -180,9 +185,10 @@ fn colours_are_as_asked_for() {
     let (_bus, endpoint) = bus(&bench);
     let _io = bench.device(&["sim", "io", "--node", "5", "--can", &endpoint]);
     bench.run(&["can", "nmt", "start", "5", "--can", &endpoint]).ends(0);
-    let green = |more: &[&str]| {
+    let green = |more: &[&str], environment: &[(&str, &str)]| {
         let _guard = Guarding::new(&bench, &endpoint);
-        let mut seat = Seat::new(&bench, &[&["monitor", "--can", &endpoint], more].concat(), (120, 30));
+        let arguments = [&["monitor", "--can", &endpoint], more].concat();
+        let mut seat = Seat::with(&bench, &arguments, (120, 30), environment);
         seat.sees("operational");
         seat.presses("q");
         seat.child.wait().unwrap();
@@ -190,8 +196,10 @@ fn colours_are_as_asked_for() {
         seat.ends(0);
         colored
     };
-    assert!(green(&[]));
-    assert!(!green(&["--color", "never"]));
+    assert!(green(&[], &[]));
+    assert!(!green(&["--color", "never"], &[]));
+    assert!(!green(&[], &[("NO_COLOR", "1")]));
+    assert!(green(&["--color", "always"], &[("NO_COLOR", "1")]));
 }
 
 /// Somebody who guards node 5.
@@ -310,6 +318,13 @@ fn a_capture() {
     }
     seat.presses("q");
     seat.ends(0);
+
+    // What a device file says of process data, without a transfer that does.
+    let _node = bench.device(&["sim", "io", "--node", "5", "--can", "virtual:a", "--write-eds", "io.eds"]);
+    std::fs::write(bench.path("pdo.log"), "(1.0) can0 185#03\n(1.1) can0 185#04\n").unwrap();
+    let pdo = ["monitor", "pdo.log", "--once", "--json", "--eds", "5=io.eds"];
+    let value = bench.run(&pdo).ends(0).json()["repeating"][0]["values"][0].clone();
+    assert_eq!((&value["index"], &value["value"]), (&json!(0x6000), &json!(4)), "{value}");
 
     // From standard input, and what is no capture.
     let piped = bench

@@ -2,7 +2,17 @@
 //!
 //! What is known of the subject (`bus`, fed by `listen` and `replay`; `controller`, fed by `poll`; `line`) is
 //! kept apart from the screen: it gives a `sheet` of tables, which `screen` draws and `--once` prints, and a
-//! JSON document.
+//! JSON document. Its times are seconds; what is not known is null:
+//!
+//! - all: `source`, `story` (lines as `decode` words them);
+//! - buses: `seconds`, `bitrate`, `by_kind`; `buses` with `state`, `frames`, `error_frames`, `overruns`, and `now` (the last
+//!   second), `mean` and `peak` of `frames_per_second`, `bits_per_second`, `load_percent`; `nodes` with `state`,
+//!   `drive`, `name`, `identity`, `error_control` (`kind`, `period`, `age`, `missed`, `silent`), `emergency`,
+//!   `sdo`; `repeating` with `what`, `count`, `period`, `shortest`, `longest`, `age`, `changes`, `data`, `values`;
+//!   of a capture `frames` and `damaged`;
+//! - a controller: `seconds`, `answers`, `identity`, `failures`, `axes_activated`, `plc`, `axes`, `can`, and what was asked
+//!   for: `parameters`, `ram`;
+//! - a capture of an LB2 line: `telegrams`, `discarded_bytes`, `functions`, `errors`, `parameters`.
 
 mod bus;
 pub(crate) mod cli;
