@@ -104,6 +104,18 @@ impl OpenError {
             _ => Self::Io { endpoint, error },
         }
     }
+
+    /// The same of the endpoint that this one is a part of.
+    pub(crate) fn of(mut self, whole: &impl ToString) -> Self {
+        let (Self::Missing { endpoint }
+        | Self::Busy { endpoint }
+        | Self::Permission { endpoint }
+        | Self::NotSerial { endpoint }
+        | Self::NotBuilt { endpoint, .. }
+        | Self::Io { endpoint, .. }) = &mut self;
+        *endpoint = whole.to_string();
+        self
+    }
 }
 
 /// Opens an endpoint.

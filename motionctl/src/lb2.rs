@@ -17,7 +17,7 @@ pub(crate) fn run(out: &Output, global: &Global, command: &Lb2) -> Result<(), Ex
         Lb2::Failures { line } => failures(out, global, line),
         Lb2::ClearFailures { line } => {
             if global.dry_run {
-                out.say("would delete all stored failures");
+                out.plan("would delete all stored failures");
                 return Ok(());
             }
             let count = connect(out, global, line)?.delete_failures()?;
@@ -47,7 +47,7 @@ pub(crate) fn run(out: &Output, global: &Global, command: &Lb2) -> Result<(), Ex
         Lb2::EraseFlash { line, bank } => {
             let bank = checked_bank(Some(*bank), true)?;
             if global.dry_run {
-                out.say(&format!("would erase flash bank {bank}"));
+                out.plan(&format!("would erase flash bank {bank}"));
                 return Ok(());
             }
             out.confirm(global.yes, &format!("Erase flash bank {bank}?"))?;
@@ -171,7 +171,7 @@ fn write(
     }
     let plan = format!("{} bytes to {kind} bank {} from offset {offset}", bytes.len(), area.bank);
     if global.dry_run {
-        out.say(&format!("would write {plan}{}", if erase { ", after erasing it" } else { "" }));
+        out.plan(&format!("would write {plan}{}", if erase { ", after erasing it" } else { "" }));
         return Ok(());
     }
     if area.flash {
@@ -219,7 +219,7 @@ fn raw(out: &Output, global: &Global, line: &Line, hex: &str) -> Result<(), Exit
     }
     let request = Request::Raw { function: *function, data };
     if global.dry_run {
-        out.say(&format!("would send function {function:02X}h with {} data bytes", data.len()));
+        out.plan(&format!("would send function {function:02X}h with {} data bytes", data.len()));
         return Ok(());
     }
     // Known functions are answered in their own form, which a raw request does not expect.

@@ -65,6 +65,11 @@ impl Output {
         }
     }
 
+    /// What a dry run would have done: its result.
+    pub(crate) fn plan(&self, text: &str) {
+        self.document(json!({ "dry_run": true, "plan": text }), || println!("{text}"));
+    }
+
     /// Something worth knowing that is no result.
     pub(crate) fn remark(&self, text: impl Into<String>) {
         let text = text.into();
@@ -160,6 +165,8 @@ pub(crate) fn write_file<T>(
     // A link goes on leading to the file.
     let path = path.canonicalize().unwrap_or_else(|_| path.into());
     let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    // Whoever asked knows nothing of the file beside it.
+    std::fs::metadata(directory).map_err(|error| trouble(&error))?;
     let mut file = tempfile::NamedTempFile::new_in(directory).map_err(|error| trouble(&error))?;
     let mut writer = BufWriter::new(file.as_file_mut());
     let done = write(&mut writer)?;

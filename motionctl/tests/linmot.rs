@@ -317,3 +317,66 @@ fn a_dry_run_of_reading_a_curve_touches_nothing() {
     }
     assert!(!bench.path("D").exists());
 }
+
+/// The plan is the result of a dry run: text, or one document, and nothing is opened or written for it.
+#[test]
+fn a_dry_run_says_its_plan_in_words_or_as_json() {
+    let bench = Bench::new();
+    let _drive = drive(&bench, "--can=slcan-pty:LINE");
+    let linmot = Linmot { bench: &bench, carrier: &["--can", "slcan:LINE"] };
+    std::fs::write(bench.path("C.csv"), CURVE).unwrap();
+    let entry = entry(0xFFFF, "x");
+    for (arguments, plan) in [
+        (&["params", "set", "13A2h", "--", "77"][..], "would write 77 to 13A2h in RAM and ROM"),
+        (
+            &["params", "defaults", "--layer", "os", "mc"],
+            "would set the ROM values of os, mc to their defaults",
+        ),
+        (&["curve", "add", "5", "C.csv"], "would write   5  Example_Curve          10 setpoints, 200 ms"),
+        (&["curve", "get", "5", "-o", "D.csv"], "would read curve 5 and write it to D.csv"),
+        (&["curve", "save"], "would save all curves to flash"),
+        (&["curve", "delete-all"], "would delete all curves in RAM"),
+        (&["table", "set", "5", "--raw", &entry], "would write entry 5"),
+        (&["table", "delete", "5"], "would delete entry 5"),
+        (&["table", "delete-all"], "would delete all entries in RAM"),
+        (&["table", "save"], "would save the command table to flash"),
+        (&["table", "backup", "T.toml"], "would write 0 entries to T.toml"),
+        (&["pvl", "backup", "B.pvl"], "would write ROM values and curves to B.pvl"),
+        (&["restart"], "would restart the drive"),
+    ] {
+        let words = linmot.run(&[&["--dry-run"], arguments].concat()).ends(0);
+        assert_eq!(words.stdout(), format!("{plan}\n"), "{arguments:?}");
+        let json = linmot.json(&[&["--dry-run"], arguments].concat());
+        assert_eq!((json["dry_run"].as_bool(), json["plan"].as_str()), (Some(true), Some(plan)));
+    }
+    let build =
+        ["--dry-run", "--json", "linmot", "curve", "build", "-o", "D.csv", "--to", "1mm", "--length", "1s"];
+    assert_eq!(bench.run(&build).ends(0).json()["dry_run"], true);
+    for file in ["B.pvl", "D.csv", "T.toml"] {
+        assert!(!bench.path(file).exists(), "{file}");
+    }
+    linmot.run(&["params", "list", "--changed"]).ends(0).says("no parameters");
+}
+
+/// What the command line cannot mean is refused before anything is opened, in the user's words.
+#[test]
+fn wrong_usage_is_named() {
+    let bench = Bench::new();
+    let run = |arguments: &[&str]| bench.run(arguments);
+    let get = ["linmot", "params", "get", "13A2h"];
+    let with = |more: &[&str]| run(&[&get[..], more].concat());
+    with(&["--port", "LINE", "--carrier", "pdo"]).ends(2).says("cannot be used with '--carrier <CARRIER>'");
+    with(&["--can", "slcan:LINE", "--checksum", "crc"]).ends(2).says("cannot be used with");
+    with(&["--can", "slcan:LINE", "--port", "LINE"]).ends(2).says("cannot be used with");
+    with(&["--can", "slcan:LINE", "--node", "128"]).ends(2).says("1 to 127 expected");
+    with(&["--can", "slcan:LINE", "--timeout", "0"]).ends(2).says("seconds above 0 expected");
+    // The endpoint as it was written, not the part of it that failed.
+    with(&["--can", "slcan:NONE"]).ends(5).says("error: slcan:NONE").says("no such port");
+    run(&["sim", "linmot"]).ends(2).says("--can EP or --serial EP expected");
+    run(&["sim", "linmot", "--can", "slcan-pty:none/X"])
+        .ends(5)
+        .says("error: slcan-pty:none/X: no such port");
+    let build = ["linmot", "curve", "build", "--to", "1mm", "--length", "1s", "-o", "none/C.csv"];
+    let ran = run(&build).ends(5);
+    assert_eq!(ran.stderr(), "error: none/C.csv: No such file or directory (os error 2)\n");
+}

@@ -82,6 +82,7 @@ fn numbers_in_the_upper_half_and_floats_are_what_they_are() {
             .ends(0)
             .says("ROM -60 (000000C4h)")
             .says("minimum -128, maximum -56, default -100");
+        set(&["03F2h", "--type", "u8", "--", "x"]).ends(2).says("--type: UPID 03F2h is a string");
         // And what a backup holds is the same bits.
         linmot.run(&["pvl", "backup", "B.pvl"]).ends(0);
         linmot.run(&["--yes", "params", "defaults", "--layer", "application"]).ends(0);

@@ -198,16 +198,18 @@ pub fn open(endpoint: &CanEndpoint) -> Result<Box<dyn CanPort>, OpenError> {
         CanEndpoint::Slcan { path, bit_rate, baud } => {
             let settings = Settings { baud: *baud, parity: Parity::None, stop_bits: 1 };
             let line = Endpoint::Serial { path: path.clone(), settings };
-            let port = crate::port::open(&line, Role::Master)?;
+            let port = crate::port::open(&line, Role::Master).map_err(|error| error.of(endpoint))?;
             let host = slcan::Host::new(port, *bit_rate).map_err(|error| OpenError::new(endpoint, error))?;
             Ok(Box::new(host))
         }
         CanEndpoint::SlcanPty { link } => {
-            let port = crate::port::open(&Endpoint::Pty { link: link.clone() }, Role::Device)?;
+            let line = Endpoint::Pty { link: link.clone() };
+            let port = crate::port::open(&line, Role::Device).map_err(|error| error.of(endpoint))?;
             Ok(Box::new(slcan::AdapterPort::new(port)))
         }
         CanEndpoint::Socketcand { address, bus } => {
-            let port = crate::port::open(&Endpoint::Tcp { address: address.clone() }, Role::Master)?;
+            let line = Endpoint::Tcp { address: address.clone() };
+            let port = crate::port::open(&line, Role::Master).map_err(|error| error.of(endpoint))?;
             let client =
                 socketcand::Client::new(port, bus).map_err(|error| OpenError::new(endpoint, error))?;
             Ok(Box::new(client))

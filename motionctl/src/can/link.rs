@@ -189,7 +189,7 @@ fn set(
     let setting = Setting { role: Role::Transmit(trigger), ..Setting::OFF };
     let limit = limit(run, default)?;
     if global.dry_run {
-        out.say(&format!("would send {} on channel {channel}", hex(data)));
+        out.plan(&format!("would send {} on channel {channel}", hex(data)));
         return Ok(());
     }
     let mut device = Device::open(global, line, None, Some((channel, setting)))?;

@@ -54,7 +54,7 @@ pub(crate) fn run(out: &Output, global: &Global, command: &Lss) -> Result<(), Ex
         Lss::SetNode { node, target } => {
             let wanted = if *node == NO_NODE { None } else { Some(node_id(*node)?) };
             if global.dry_run {
-                out.say(&format!("would give the device node ID {node}"));
+                out.plan(&format!("would give the device node ID {node}"));
                 return Ok(());
             }
             let (mut session, outcome) = with_target(global, target, Operation::ConfigureNodeId(wanted))?;
@@ -70,7 +70,7 @@ pub(crate) fn run(out: &Output, global: &Global, command: &Lss) -> Result<(), Ex
                 Exit::usage(format!("{kbits}: 1000, 800, 500, 250, 125, 50, 20 or 10 kbit/s expected"))
             })?;
             if global.dry_run {
-                out.say(&format!("would give the device {kbits} kbit/s"));
+                out.plan(&format!("would give the device {kbits} kbit/s"));
                 return Ok(());
             }
             let (_, outcome) = with_target(global, target, Operation::ConfigureBitTiming(rate))?;
@@ -81,7 +81,7 @@ pub(crate) fn run(out: &Output, global: &Global, command: &Lss) -> Result<(), Ex
         }
         Lss::Store { target } => {
             if global.dry_run {
-                out.say("would let the device keep node ID and bit rate");
+                out.plan("would let the device keep node ID and bit rate");
                 return Ok(());
             }
             let (mut session, outcome) = with_target(global, target, Operation::Store)?;

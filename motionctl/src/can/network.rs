@@ -140,7 +140,7 @@ pub(crate) fn nmt(
         }
     };
     if global.dry_run {
-        out.say(&format!("would send {command} to {node}"));
+        out.plan(&format!("would send {command} to {node}"));
         return Ok(());
     }
     let mut session = Session::open(global, line)?;

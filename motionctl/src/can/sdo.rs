@@ -58,7 +58,7 @@ pub(crate) fn run(out: &Output, global: &Global, command: &Sdo) -> Result<(), Ex
             };
             if global.dry_run {
                 let bytes = counted(data.len(), "byte", "bytes");
-                out.say(&format!("would write {bytes} to {at} of node {}", object.node));
+                out.plan(&format!("would write {bytes} to {at} of node {}", object.node));
                 return Ok(());
             }
             let mut session = Session::open(global, &object.line)?;

@@ -35,7 +35,7 @@ pub(super) fn run(out: &Output, global: &Global, arguments: &Build) -> Result<()
     let text = curve::describe(&info);
     let text = text.trim_start().trim_start_matches(|c: char| c.is_ascii_digit()).trim_start();
     if global.dry_run {
-        out.say(&format!("would write {text}{speed} to {file}"));
+        out.plan(&format!("would write {text}{speed} to {file}"));
         return Ok(());
     }
     curve::save(&arguments.output, &info, &setpoints)?;

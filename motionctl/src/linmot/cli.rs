@@ -21,10 +21,10 @@ pub(crate) struct Drive {
     pub(crate) node: u8,
     /// How CAN carries the commands: default SDO, or the configuration module in RPDO 4 and TPDO 4, for
     /// which the node is started (operational)
-    #[arg(long, value_enum, default_value_t = Carrier::Sdo)]
+    #[arg(long, value_enum, default_value_t = Carrier::Sdo, conflicts_with = "port")]
     pub(crate) carrier: Carrier,
     /// Checksum of LinRS frames, as the drive's UPID 2080h says
-    #[arg(long, value_enum, default_value_t = SumKind::None)]
+    #[arg(long, value_enum, default_value_t = SumKind::None, conflicts_with = "can")]
     pub(crate) checksum: SumKind,
 }
 
@@ -456,7 +456,7 @@ pub(crate) enum Pvl {
 #[derive(Debug, Clone, Args)]
 pub(crate) struct SimLinmot {
     /// CAN endpoint to be a node on, or a name of the configuration
-    #[arg(long, value_name = "EP", required_unless_present = "serial")]
+    #[arg(long, value_name = "EP")]
     pub(crate) can: Option<String>,
     /// Serial endpoint to answer LinRS on: pty:LINK, tcp:HOST:PORT, a serial port, or a name of the configuration
     #[arg(long, value_name = "EP", alias = "port", conflicts_with = "can")]

@@ -33,7 +33,7 @@ pub(super) fn run(out: &Output, global: &Global, command: &Command) -> Result<()
         Command::Modify { drive, id, file } => write(out, global, drive, Access::Modify, *id, file),
         Command::Save { drive } => {
             if global.dry_run {
-                out.say("would save all curves to flash");
+                out.plan("would save all curves to flash");
                 return Ok(());
             }
             out.confirm(global.yes, "Stop the MC software and write all curves to flash?")?;
@@ -44,7 +44,7 @@ pub(super) fn run(out: &Output, global: &Global, command: &Command) -> Result<()
         }
         Command::DeleteAll { drive } => {
             if global.dry_run {
-                out.say("would delete all curves in RAM");
+                out.plan("would delete all curves in RAM");
                 return Ok(());
             }
             out.confirm_on_terminal(global.yes, "Delete all curves in RAM?")?;
@@ -102,7 +102,7 @@ fn take(
     let id = usable(id)?;
     let file = file.display();
     if global.dry_run {
-        out.say(&format!("would read curve {id} and write it to {file}"));
+        out.plan(&format!("would read curve {id} and write it to {file}"));
         return Ok(());
     }
     let (info, setpoints) = read(out, &mut connect(global, drive)?, id)?;
@@ -157,7 +157,7 @@ fn write(
 ) -> Result<(), Exit> {
     let (info, setpoints) = load(file, usable(id)?)?;
     if global.dry_run {
-        out.say(&format!("would write {}", describe(&info)));
+        out.plan(&format!("would write {}", describe(&info)));
         return Ok(());
     }
     let mut link = connect(global, drive)?;

@@ -69,7 +69,7 @@ fn errors(out: &Output, global: &Global, drive: &Drive) -> Result<(), Exit> {
 
 fn restart(out: &Output, global: &Global, drive: &Drive, wait: bool) -> Result<(), Exit> {
     if global.dry_run {
-        out.say("would restart the drive");
+        out.plan("would restart the drive");
         return Ok(());
     }
     out.confirm_on_terminal(global.yes, "Restart the drive? Its motion stops.")?;

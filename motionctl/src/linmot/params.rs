@@ -114,7 +114,12 @@ fn list(out: &Output, global: &Global, drive: &Drive, changed: bool) -> Result<(
     }
     bar.finish_and_clear();
     let json: Vec<Json> = list.iter().map(to_json).collect();
-    out.document(json!({ "parameters": json }), || list.iter().for_each(print));
+    out.document(json!({ "parameters": json }), || {
+        if list.is_empty() {
+            println!("no parameters");
+        }
+        list.iter().for_each(print);
+    });
     Ok(())
 }
 
@@ -165,6 +170,7 @@ fn get(
 ) -> Result<(), Exit> {
     let mut link = connect(global, drive)?;
     let usage = usage(&mut link, upid)?;
+    numeric(upid, usage, kind)?;
     let mut shown = read(&mut link, upid, usage, memory)?;
     let mut default = None;
     if shown.text.is_none() {
@@ -210,6 +216,7 @@ fn set(
 ) -> Result<(), Exit> {
     let mut link = connect(global, drive)?;
     let usage = usage(&mut link, upid)?;
+    numeric(upid, usage, kind)?;
     let live = usage.contains(Usage::LIVE) && usage.contains(Usage::RAM_WRITE);
     let memory = match (memory.ram, memory.rom, memory.both) {
         (true, ..) => Memory::Ram,
@@ -235,7 +242,7 @@ fn set(
         Wanted::Number(raw, range) => range.number(*raw).to_string(),
     };
     if global.dry_run {
-        out.say(&format!("would write {said} to {upid} in {name}"));
+        out.plan(&format!("would write {said} to {upid} in {name}"));
         return Ok(());
     }
     out.confirm_on_terminal(global.yes, &format!("Write {said} to {upid} in {name}?"))?;
@@ -257,6 +264,14 @@ fn set(
     let mut shown = read(&mut link, upid, usage, BOTH)?;
     shown.range = told.or(shown.range);
     out.document(json!({ "parameters": [to_json(&shown)] }), || print(&shown));
+    Ok(())
+}
+
+/// A string has no type of a number.
+fn numeric(upid: Upid, usage: Usage, kind: Option<TypeName>) -> Result<(), Exit> {
+    if usage.is_opaque() && kind.is_some() {
+        return Err(Exit::usage(format!("--type: UPID {upid} is a string")));
+    }
     Ok(())
 }
 
@@ -342,7 +357,7 @@ fn defaults(out: &Output, global: &Global, drive: &Drive, layers: &[LayerName]) 
     let layers: Vec<Layer> = layers.collect();
     let names: Vec<&str> = layers.iter().map(|layer| layer.name()).collect();
     if global.dry_run {
-        out.say(&format!("would set the ROM values of {} to their defaults", names.join(", ")));
+        out.plan(&format!("would set the ROM values of {} to their defaults", names.join(", ")));
         return Ok(());
     }
     out.confirm(global.yes, &format!("Set the ROM values of {} to their defaults?", names.join(", ")))?;

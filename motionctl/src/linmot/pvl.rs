@@ -76,7 +76,7 @@ fn backup(
 ) -> Result<(), Exit> {
     let name = path.display().to_string();
     if global.dry_run {
-        out.say(&format!("would write ROM values and curves to {name}"));
+        out.plan(&format!("would write ROM values and curves to {name}"));
         return Ok(());
     }
     let mut link = connect(global, drive)?;

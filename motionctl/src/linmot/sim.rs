@@ -26,6 +26,9 @@ use crate::output::Output;
 const TURN: Duration = Duration::from_millis(50);
 
 pub(crate) fn run(out: &Output, global: &Global, arguments: &SimLinmot) -> Result<(), Exit> {
+    if arguments.can.is_none() && arguments.serial.is_none() {
+        return Err(Exit::usage("where the drive shall be: --can EP or --serial EP expected"));
+    }
     let mut drive = VirtualDrive::new(generated(arguments.parameters), Times::default());
     // What a drive without motor data has logged by the time it is first used.
     drive.log_error(LoggedError { code: 0x01, hours: 0, milliseconds: 120 });

@@ -36,7 +36,7 @@ pub(super) fn run(out: &Output, global: &Global, command: &Table) -> Result<(), 
         Table::Set { drive, entry, raw } => set(out, global, drive, *entry, raw),
         Table::Delete { drive, entry } => {
             if global.dry_run {
-                out.say(&format!("would delete entry {entry}"));
+                out.plan(&format!("would delete entry {entry}"));
                 return Ok(());
             }
             connect(global, drive)?.ask(Request::DeleteEntry { entry: *entry })?;
@@ -45,7 +45,7 @@ pub(super) fn run(out: &Output, global: &Global, command: &Table) -> Result<(), 
         }
         Table::DeleteAll { drive } => {
             if global.dry_run {
-                out.say("would delete all entries in RAM");
+                out.plan("would delete all entries in RAM");
                 return Ok(());
             }
             out.confirm_on_terminal(global.yes, "Delete all command table entries in RAM?")?;
@@ -55,7 +55,7 @@ pub(super) fn run(out: &Output, global: &Global, command: &Table) -> Result<(), 
         }
         Table::Save { drive } => {
             if global.dry_run {
-                out.say("would save the command table to flash");
+                out.plan("would save the command table to flash");
                 return Ok(());
             }
             out.confirm(global.yes, "Stop the MC software and write the command table to flash?")?;
@@ -133,7 +133,7 @@ fn show(out: &Output, entries: &Entries) {
 fn set(out: &Output, global: &Global, drive: &Drive, number: u16, raw: &str) -> Result<(), Exit> {
     let entry = parse(raw).map_err(|error| Exit::usage(format!("--raw: {error}")))?;
     if global.dry_run {
-        out.say(&format!("would write entry {number}"));
+        out.plan(&format!("would write entry {number}"));
         return Ok(());
     }
     let mut link = connect(global, drive)?;
@@ -196,7 +196,7 @@ fn backup(out: &Output, global: &Global, drive: &Drive, path: &Path) -> Result<(
     let entries = read(out, &mut connect(global, drive)?)?;
     let name = path.display().to_string();
     if global.dry_run {
-        out.say(&format!("would write {} to {name}", entries_of(&entries)));
+        out.plan(&format!("would write {} to {name}", entries_of(&entries)));
         return Ok(());
     }
     let mut document = toml_edit::DocumentMut::new();
@@ -260,7 +260,7 @@ fn restore(out: &Output, global: &Global, drive: &Drive, path: &Path) -> Result<
         return Err(Exit::check(format!("{}: {fault}", path.display())));
     }
     if global.dry_run {
-        out.say(&format!("would write {} to RAM and flash", entries_of(&entries)));
+        out.plan(&format!("would write {} to RAM and flash", entries_of(&entries)));
         return Ok(());
     }
     out.confirm(global.yes, "Stop the MC software and write the command table to RAM and flash?")?;

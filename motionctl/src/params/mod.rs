@@ -186,14 +186,12 @@ fn set(out: &Output, global: &Global, line: &Line, pairs: &[String], save: bool)
     }
     let old = read(out, &mut client, &entries)?;
     if global.dry_run {
-        for (entry, value) in &wanted {
+        let line = |(entry, value): &(Entry, i32)| {
             let before = old.get(&entry.index()).copied().unwrap_or(0);
-            out.say(&format!(
-                "would set {entry}: {} -> {}",
-                entry.format(before, &display),
-                entry.format(*value, &display)
-            ));
-        }
+            let (before, after) = (entry.format(before, &display), entry.format(*value, &display));
+            format!("would set {entry}: {before} -> {after}")
+        };
+        out.plan(&wanted.iter().map(line).collect::<Vec<_>>().join("\n"));
         return Ok(());
     }
     if save {
@@ -216,7 +214,7 @@ fn backup(
     let identity = identify(&mut client)?;
     let entries: Vec<Entry> = iter().collect();
     if global.dry_run {
-        out.say(&format!(
+        out.plan(&format!(
             "would back up {} parameters of a GEL {} to {}",
             entries.len(),
             identity.model,

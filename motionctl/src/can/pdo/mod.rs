@@ -105,7 +105,7 @@ pub(crate) fn run(out: &Output, global: &Global, command: &Pdo) -> Result<(), Ex
                 ];
                 let parts: Vec<String> = parts.into_iter().flatten().collect();
                 let parts = if parts.is_empty() { "as it is".to_owned() } else { parts.join(", ") };
-                out.say(&format!("would set {pdo} of node {node} up: {parts}"));
+                out.plan(&format!("would set {pdo} of node {node} up: {parts}"));
                 return Ok(());
             }
             let session = Session::open(global, line)?;
@@ -211,7 +211,7 @@ pub(crate) fn dcf(out: &Output, global: &Global, line: &CanLine, node: u8, file:
     let bytes = std::fs::read(file).map_err(|error| Exit::file(&name, &error))?;
     let entries = entries(&bytes, node).map_err(|error| Exit::file(&name, &error))?;
     if global.dry_run {
-        out.say(&format!("would write {} objects to node {node}", entries.len()));
+        out.plan(&format!("would write {} objects to node {node}", entries.len()));
         return Ok(());
     }
     let id = node_id(node)?;
