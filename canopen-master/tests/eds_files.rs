@@ -61,3 +61,16 @@ fn every_file_survives_being_written_or_is_refused_with_a_reason() {
         assert!(error.contains(words), "{name}: {error}");
     }
 }
+
+/// 1.7 MB of text became 1.1 GB of sub-objects.
+#[test]
+fn a_small_file_does_not_fill_the_memory() {
+    let object =
+        |index: u16| format!("[{index:X}]\nParameterName=a\nDataType=7\nAccessType=rw\nCompactSubObj=254\n");
+    let text: String = (0x2000..0x6000).map(object).collect();
+    let reading = eds::read(text.as_bytes()).unwrap();
+    let entries: usize = reading.device.objects.iter().map(|object| object.subs.len()).sum();
+    assert!((100_000..500_000).contains(&entries), "{entries}");
+    assert!(reading.diagnostics.iter().any(|found| found.message.contains("passed over")));
+    assert!(matches!(eds::read(&vec![b'\n'; (4 << 20) + 1]), Err(eds::ReadError::TooLong)));
+}

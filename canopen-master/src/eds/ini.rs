@@ -83,7 +83,7 @@ impl<'a> Document<'a> {
         let mut sections: Vec<Section<'a>> = Vec::new();
         for line in lines(text) {
             if let LineKind::Section { name, .. } = line.kind {
-                sections.push(Section { name, line: line.number, lines: Vec::with_capacity(8) });
+                sections.push(Section { name, line: line.number, lines: Vec::new() });
             } else if sections.is_empty() {
                 sections.push(Section { name: "", line: 0, lines: Vec::new() });
             }

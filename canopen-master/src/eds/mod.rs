@@ -116,9 +116,9 @@ impl Source {
     }
 }
 
-/// The longest file that is read, in bytes: forty times the longest one known, and short enough that a file
+/// The longest file that is read, in bytes: ten times the longest one known, and short enough that a file
 /// made to fill the memory does not.
-pub const MOST_BYTES: usize = 16 << 20;
+pub const MOST_BYTES: usize = 4 << 20;
 
 /// Why a file is refused.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]

@@ -15,8 +15,8 @@ use super::types::{Access, ObjectType, PdoMapping};
 use super::value::Number;
 use crate::data_type::DataType;
 
-/// Bytes of text that compact storage repeats in one file, at most: every sub-object has the object's own.
-const COMPACT_TEXT: usize = 64 << 20;
+/// Bytes that the sub-objects of compact storage take in one file, at most: every one has the object's own text.
+const COMPACT_ROOM: usize = 64 << 20;
 
 /// Collects the sections of objects, which come in any order.
 #[derive(Default)]
@@ -66,15 +66,15 @@ impl<'a> Builder<'a> {
             }
         }
         self.check_declared(findings);
-        let mut room = COMPACT_TEXT;
+        let mut room = COMPACT_ROOM;
         for object in self.objects.values_mut() {
             let Some(count) = object.compact.filter(|count| *count > 0) else { continue };
-            let needed = usize::from(count) * object.own.text_length();
+            let needed = usize::from(count) * (size_of::<Entry>() + object.own.text_length());
             if needed > room {
                 let line = self.declared.get(&object.index).map_or(0, |declared| declared.section.line);
                 let message = format!(
-                    "CompactSubObj={count} would repeat {} bytes; passed over",
-                    object.own.text_length()
+                    "CompactSubObj={count} passed over: the sub-objects of this file take {} MiB already",
+                    (COMPACT_ROOM - room) >> 20
                 );
                 findings.add(line, Rule::Compact, message);
                 continue;
