@@ -266,6 +266,58 @@ fn what_cannot_run_is_named() {
     bench.run(&["run", "."]).ends(5);
 }
 
+/// Decision 28 holds for an axis that brakes off a limit switch when the end comes: it is not let go before it
+/// stands.
+#[test]
+fn a_failed_axis_is_brought_to_standstill_at_the_end() {
+    let bench = Bench::new();
+    let config = r#"
+[parameters]
+0 = 1
+108 = 0
+109 = 0
+601 = 0
+602 = 0
+642 = 100000
+648 = 300
+654 = 200
+660 = 1000
+924 = 1
+930 = 20000
+
+[[simulate]]
+kind = "plant"
+block = 1
+drive = "first-order"
+speed = 100000
+tau = 0.005
+
+[[program]]
+at = 0.05
+do = "power"
+axis = 1
+[[program]]
+at = 0.1
+do = "move-velocity"
+axis = 1
+velocity = 100000
+"#;
+    std::fs::write(bench.path("run.toml"), config).unwrap();
+    let ran = bench.run(&["run", "run.toml", "--for", "0.7", "--record", "run.csv"]).ends(0);
+    let ran = ran.says("error-stop").says("upper software limit passed");
+    let recorded = std::fs::read_to_string(bench.path("run.csv")).unwrap();
+    let mut lines = recorded.lines();
+    let names: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let place = names.iter().position(|name| *name == "nominal_velocity").unwrap();
+    let velocities: Vec<f64> =
+        lines.map(|line| line.split(',').nth(place).unwrap().parse().unwrap()).collect();
+    assert!(velocities.contains(&100_000.0));
+    assert_eq!(velocities.last(), Some(&0.0));
+    // 100 a cycle; what was let go drops to 0 at once.
+    let steepest = velocities.windows(2).map(|pair| pair[0] - pair[1]).fold(0.0, f64::max);
+    assert!(steepest <= 101.0, "{steepest} in a cycle: {}", ran.stdout());
+}
+
 /// Every mistake is named with its place, with status 2, before anything is begun.
 #[test]
 fn mistakes_in_a_configuration_are_named() {

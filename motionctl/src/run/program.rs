@@ -111,12 +111,16 @@ impl Program {
 
     fn bring_to_standstill(&mut self, plc: &mut Plc<'_>) {
         for (stop, power) in &mut self.stops {
-            let Ok(state) = plc.axis(stop.axis).map(|axis| axis.status().state) else { continue };
-            let moving = !matches!(state, State::Disabled | State::Standstill | State::ErrorStop);
+            let Ok(status) = plc.axis(stop.axis).map(|axis| *axis.status()) else { continue };
             stop.execute = true;
             let outputs = stop.call(plc);
-            // A failed axis has stopped by itself.
-            if outputs.done || outputs.error || !moving {
+            let stands = match status.state {
+                State::Disabled | State::Standstill => true,
+                // A failed axis stops by itself, with its drive enabled as long as it can be.
+                State::ErrorStop => status.nominal_velocity == 0.0,
+                _ => outputs.done,
+            };
+            if stands {
                 power.enable = false;
                 // An axis that is not activated has no drive to disable.
                 let _ = power.call(plc);
