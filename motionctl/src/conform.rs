@@ -100,7 +100,9 @@ fn plan(out: &Output, node: u8, device: &eds::Device) {
             let touches = if check.touches.is_empty() { "only reads" } else { check.touches };
             println!("  {}: {} ({})\n    {touches}", check.id, check.title, check.clause);
         }
-        println!("  and each of {values} values of the device file, read and written as its access says");
+        println!(
+            "  and each of {values} values of the device file, compared, read and written as its access says"
+        );
         println!("    writes nothing but what it has read; outside 1000h to 1FFFh only with --yes");
     });
 }

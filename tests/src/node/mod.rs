@@ -14,14 +14,16 @@ mod objects;
 mod pdos;
 mod sdo;
 mod tester;
+mod values;
+mod words;
 
 use core::fmt;
 use core::time::Duration;
 use std::io;
 
-use canopen_master::NodeId;
 use canopen_master::eds::Device;
 use canopen_master::nmt::Command;
+use canopen_master::{Address, NodeId};
 
 use crate::report::{Case, Outcome};
 pub use bench::Bench;
@@ -108,17 +110,22 @@ const fn check(
     Check { id, title, clause, touches, run }
 }
 
-/// All checks, in the order in which they are made; between the first two groups and the rest, every
-/// object of the device file is read and written.
+/// Before the objects of the device file are read and written, one by one.
+const BEFORE: [&[Check]; 4] = [network::BOOT, sdo::CHECKS, sdo::BLOCKS, values::CHECKS];
+/// After it.
+const AFTER: [&[Check]; 2] = [network::CHECKS, pdos::CHECKS];
+
+/// All checks, in the order in which they are made; among them every object of the device file is
+/// compared, read and written.
 #[must_use]
 pub fn checks() -> Vec<Check> {
-    [network::BOOT, sdo::CHECKS, sdo::BLOCKS, network::CHECKS, pdos::CHECKS].concat()
+    BEFORE.iter().chain(&AFTER).copied().flatten().copied().collect()
 }
 
 /// Whether the node is operational, as far as it shows by itself or when asked.
 fn is_operational(tester: &mut Tester<'_>) -> Checked<bool> {
     let id = tester.error_control();
-    let period = tester.read_number(canopen_master::Address::new(0x1017, 0)).unwrap_or(0).min(5000);
+    let period = tester.read_number(Address::new(0x1017, 0)).unwrap_or(0).min(5000);
     if period == 0 {
         tester.guard_request()?;
     }
@@ -131,6 +138,22 @@ fn case(tester: &mut Tester<'_>, check: &Check) -> io::Result<Case> {
     let outcome = outcome((check.run)(tester))?;
     let time = tester.now().saturating_sub(start);
     Ok(Case { id: check.id.into(), title: check.title.into(), clause: check.clause.into(), outcome, time })
+}
+
+/// A case of one value of the device file.
+fn object_case(
+    tester: &mut Tester<'_>,
+    at: Address,
+    what: &str,
+    title: String,
+    clause: &str,
+    run: impl FnOnce(&mut Tester<'_>) -> Checked,
+) -> io::Result<Case> {
+    let start = tester.now();
+    let outcome = outcome(run(tester))?;
+    let time = tester.now().saturating_sub(start);
+    let id = format!("object.{:04X}.{:02X}.{what}", at.index, at.sub);
+    Ok(Case { id, title, clause: clause.into(), outcome, time })
 }
 
 fn outcome(checked: Checked) -> io::Result<Outcome> {
@@ -156,8 +179,7 @@ pub fn test(
         Problem::Io(error) => error,
         Problem::Fail(why) | Problem::Skip(why) => io::Error::other(why),
     };
-    let request =
-        canopen_master::sdo::message::Request::InitiateUpload { at: canopen_master::Address::new(0x1000, 0) };
+    let request = canopen_master::sdo::message::Request::InitiateUpload { at: Address::new(0x1000, 0) };
     if tester.ask_raw(request.encode()).map_err(io_only)?.is_none() {
         return Err(TestError::Silent(config.node));
     }
@@ -165,18 +187,17 @@ pub fn test(
         return Err(TestError::Operational(config.node));
     }
     let mut cases = Vec::new();
-    let groups = [network::BOOT, sdo::CHECKS, sdo::BLOCKS];
-    for check in groups.into_iter().flatten() {
-        cases.push(case(&mut tester, check)?);
-        cases.last().map(&mut told);
-    }
-    objects::test(&mut tester, |case| {
+    let mut ended = |case: Case| {
         told(&case);
         cases.push(case);
-    })?;
-    for check in [network::CHECKS, pdos::CHECKS].into_iter().flatten() {
-        cases.push(case(&mut tester, check)?);
-        cases.last().map(&mut told);
+    };
+    for check in BEFORE.into_iter().flatten() {
+        ended(case(&mut tester, check)?);
+    }
+    values::test(&mut tester, &mut ended)?;
+    objects::test(&mut tester, &mut ended)?;
+    for check in AFTER.into_iter().flatten() {
+        ended(case(&mut tester, check)?);
     }
     // As it was after power-on.
     tester.command(Command::ResetCommunication).map_err(io_only)?;

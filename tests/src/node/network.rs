@@ -7,6 +7,7 @@ use canopen_master::nmt::{Command, State};
 use canopen_master::sdo::Channel;
 
 use super::tester::{Checked, SILENCE, Tester};
+use super::words::bytes;
 use super::{Check, check, fail, skip};
 
 /// Before everything else: where a node that was just reset stands, all other checks begin.
@@ -89,7 +90,7 @@ pub(super) const CHECKS: &[Check] = &[
 fn boot(tester: &mut Tester<'_>, command: Command) -> Checked {
     let data = tester.restart(command)?;
     if data != [0] {
-        return fail(format!("the boot-up message is {data:02X?}, one byte 00 expected"));
+        return fail(format!("the boot-up message is {}, one byte 00 expected", bytes(&data)));
     }
     // One of them.
     let until = tester.now() + SILENCE;
@@ -159,7 +160,7 @@ fn heartbeat(tester: &mut Tester<'_>) -> Checked {
         let until = tester.now() + 5 * PERIOD;
         match tester.wait(id, until)?.as_deref() {
             Some([0x7F]) => {}
-            Some(data) => return fail(format!("heartbeat {data:02X?}, 7F (pre-operational) expected")),
+            Some(data) => return fail(format!("heartbeat {}, 7F (pre-operational) expected", bytes(data))),
             None => return fail(format!("no heartbeat {number} within 500 ms")),
         }
     }
@@ -194,7 +195,7 @@ fn guard(tester: &mut Tester<'_>) -> Checked<u8> {
     let until = tester.now() + tester.config.answer;
     match tester.wait(tester.error_control(), until)?.as_deref() {
         Some([reply]) => Ok(*reply),
-        Some(data) => fail(format!("guarding reply {data:02X?}, one byte expected")),
+        Some(data) => fail(format!("guarding reply {}, one byte expected", bytes(data))),
         None => fail("no answer to a guarding request"),
     }
 }

@@ -8,7 +8,8 @@ use canopen_master::eds::{Entry, ObjectType};
 use canopen_master::sdo::{AbortCode, Outcome as Ended};
 
 use super::tester::{Checked, Tester, reads, writes};
-use super::{fail, outcome, skip};
+use super::words::bytes;
+use super::{fail, object_case, skip};
 use crate::report::Case;
 
 const CLAUSE: &str = "CiA 301, 7.4.3; CiA 306-1, 6.6.3.2";
@@ -39,12 +40,8 @@ pub(super) fn test(tester: &mut Tester<'_>, mut told: impl FnMut(Case)) -> io::R
         for entry in object.entries().iter().filter(|entry| entry.object_type != ObjectType::NULL) {
             let at = Address::new(object.index, entry.subindex);
             let mut case = |tester: &mut Tester<'_>, what: &str, title: &str, run: Run| {
-                let start = tester.now();
-                let outcome = outcome(run(tester, at, entry))?;
-                let time = tester.now().saturating_sub(start);
-                let id = format!("object.{:04X}.{:02X}.{what}", at.index, at.sub);
                 let title = format!("{at} {}: {title}", entry.name);
-                told(Case { id, title, clause: CLAUSE.into(), outcome, time });
+                told(object_case(tester, at, what, title, CLAUSE, |tester| run(tester, at, entry))?);
                 io::Result::Ok(())
             };
             let access = entry.access.map_or("ro", |access| access.word());
@@ -70,7 +67,7 @@ fn value(tester: &mut Tester<'_>, at: Address) -> Checked<Vec<u8>> {
         (Ended::Aborted(code @ (AbortCode::NO_DATA | AbortCode::DEVICE_STATE | AbortCode::NO_SDO)), _) => {
             skip(format!("no value now: {code}"))
         }
-        (outcome, _) => fail(format!("cannot be read: {outcome}")),
+        (outcome, _) => tester.unreadable(at, outcome),
     }
 }
 
@@ -112,7 +109,7 @@ fn write_back(tester: &mut Tester<'_>, at: Address, _entry: &Entry) -> Checked {
         Ended::Aborted(code @ (AbortCode::DEVICE_STATE | AbortCode::LOCAL_CONTROL)) => {
             return skip(format!("not to be written now: {code}"));
         }
-        outcome => return fail(format!("its own value {data:02X?} is not taken: {outcome}")),
+        outcome => return fail(format!("its own value {} is not taken: {outcome}", bytes(&data))),
     }
     Ok(())
 }
@@ -128,7 +125,7 @@ fn refuse(tester: &mut Tester<'_>, at: Address, _entry: &Entry) -> Checked {
     }
     match tester.download(at, &data, &tester.options(false))? {
         Ended::Aborted(AbortCode::READ_ONLY) => Ok(()),
-        Ended::Done(_) => fail("it was written"),
+        Ended::Done(_) => fail("it was accepted; abort code 06010002h expected"),
         outcome => fail(format!("{outcome}; abort code 06010002h expected")),
     }
 }

@@ -8,7 +8,7 @@ use canopen_master::sdo::{AbortCode, Outcome};
 use pdo::cob;
 
 use super::tester::{Checked, Tester, writes};
-use super::{Check, check, fail, skip};
+use super::{Check, Problem, check, fail, skip};
 
 /// Bit 31 of a COB-ID: the PDO, or the service, does not exist.
 const OFF: u32 = 1 << 31;
@@ -109,19 +109,38 @@ fn parameters(tester: &mut Tester<'_>) -> Checked {
     if pdos.is_empty() {
         return skip("the device file has no PDOs");
     }
+    let mut faults = Vec::new();
     for pdo in pdos {
-        let cob = tester.read_number(pdo.at(1))? as u32;
-        let id = cob & 0x1FFF_FFFF;
-        if cob & OFF == 0 && cob & 1 << 29 == 0 && is_restricted(id) {
-            return fail(format!("{}: PDOs must not have the identifier {id:03X}h", pdo.at(1)));
+        if let Some(cob) = faults_but(tester.read_number(pdo.at(1)), &mut faults)? {
+            let cob = cob as u32;
+            let id = cob & 0x1FFF_FFFF;
+            if cob & OFF == 0 && cob & 1 << 29 == 0 && is_restricted(id) {
+                faults.push(format!("{}: PDOs must not have the identifier {id:03X}h", pdo.at(1)));
+            }
         }
-        let kind = tester.read_number(pdo.at(2))?;
+        let kind = faults_but(tester.read_number(pdo.at(2)), &mut faults)?;
         let reserved = if pdo.transmit { 241..=251 } else { 241..=253 };
-        if reserved.contains(&kind) {
-            return fail(format!("{}: transmission type {kind} is reserved", pdo.at(2)));
+        if let Some(kind) = kind.filter(|kind| reserved.contains(kind)) {
+            faults.push(format!("{}: transmission type {kind} is reserved", pdo.at(2)));
         }
     }
-    Ok(())
+    none_of(&faults)
+}
+
+/// What was read; that it cannot be is one fault more.
+fn faults_but<T>(read: Checked<T>, faults: &mut Vec<String>) -> Checked<Option<T>> {
+    match read {
+        Ok(read) => Ok(Some(read)),
+        Err(Problem::Fail(why)) => {
+            faults.push(why);
+            Ok(None)
+        }
+        Err(other) => Err(other),
+    }
+}
+
+fn none_of(faults: &[String]) -> Checked {
+    if faults.is_empty() { Ok(()) } else { fail(faults.join("; ")) }
 }
 
 /// Length in bits of an object, as its type says.
@@ -131,31 +150,45 @@ fn bits(tester: &Tester<'_>, entry: &Entry) -> Option<u64> {
 }
 
 /// The mapped bits of a PDO, each entry looked at.
-fn mapped(tester: &mut Tester<'_>, pdo: Pdo) -> Checked<u64> {
-    let count = tester.read_number(pdo.map(0))?;
+fn mapped(tester: &mut Tester<'_>, pdo: Pdo, faults: &mut Vec<String>) -> Checked<u64> {
+    let Some(count) = faults_but(tester.read_number(pdo.map(0)), faults)? else { return Ok(0) };
     if count > 64 {
-        return fail(format!("{}: {count} mapped objects, 64 at most", pdo.map(0)));
+        faults.push(format!("{}: {count} mapped objects, 64 at most", pdo.map(0)));
+        return Ok(0);
     }
     let mut sum = 0;
     for sub in 1..=count as u8 {
-        let raw = tester.read_number(pdo.map(sub))?;
+        let Some(raw) = faults_but(tester.read_number(pdo.map(sub)), faults)? else { continue };
         let (at, length) = (Address::new((raw >> 16) as u16, (raw >> 8) as u8), raw & 0xFF);
         sum += length;
         // Types as placeholders.
         if at.index < 0x20 {
             continue;
         }
-        let Some(entry) = tester.entry(at) else {
-            return fail(format!("{} maps {at}, which the device file has not", pdo.map(sub)));
-        };
-        if !entry.is_mappable() {
-            return fail(format!("{} maps {at}, which the device file calls not mappable", pdo.map(sub)));
-        }
-        if bits(tester, entry).is_some_and(|bits| bits != length) {
-            return fail(format!("{} maps {length} bits of {at}, which has another length", pdo.map(sub)));
+        let map = pdo.map(sub);
+        match tester.entry(at) {
+            None => faults.push(format!("{map} maps {at}, which the device file has not")),
+            Some(entry) if !entry.is_mappable() => {
+                faults.push(format!("{map} maps {at}, which the device file calls not mappable"));
+            }
+            Some(entry) => {
+                if let Some(bits) = bits(tester, entry).filter(|bits| *bits != length) {
+                    faults.push(format!("{map} maps {length} bits of {at}, which has {bits}"));
+                }
+            }
         }
     }
-    if sum > 64 { fail(format!("{}: {sum} bits, 64 at most", pdo.map(0))) } else { Ok(sum) }
+    if sum > 64 {
+        faults.push(format!("{}: {sum} bits, 64 at most", pdo.map(0)));
+    }
+    Ok(sum)
+}
+
+/// The mapped bits of a PDO that is mapped as it must be; otherwise 0.
+fn well_mapped(tester: &mut Tester<'_>, pdo: Pdo) -> Checked<u64> {
+    let mut faults = Vec::new();
+    let bits = mapped(tester, pdo, &mut faults)?;
+    Ok(if faults.is_empty() { bits } else { 0 })
 }
 
 fn mapping(tester: &mut Tester<'_>) -> Checked {
@@ -163,10 +196,11 @@ fn mapping(tester: &mut Tester<'_>) -> Checked {
     if pdos.is_empty() {
         return skip("the device file has no PDOs");
     }
+    let mut faults = Vec::new();
     for pdo in pdos {
-        mapped(tester, pdo)?;
+        mapped(tester, pdo, &mut faults)?;
     }
-    Ok(())
+    none_of(&faults)
 }
 
 /// The first TPDO with a value that can be written.
@@ -224,7 +258,7 @@ fn synchronous(tester: &mut Tester<'_>) -> Checked {
         .collect();
     for pdo in candidates {
         let cob = tester.read_number(pdo.at(1))? as u32;
-        let bits = mapped(tester, pdo).unwrap_or(0);
+        let bits = well_mapped(tester, pdo)?;
         if cob & (OFF | 1 << 29) == 0 && bits > 0 {
             let run = run_synchronous(tester, pdo, (cob & 0x7FF) as u16, bits.div_ceil(8) as usize);
             tester.restart(Command::ResetCommunication)?;
@@ -279,7 +313,7 @@ fn pdo_length(tester: &mut Tester<'_>) -> Checked {
         let cob = tester.read_number(pdo.at(1))? as u32;
         // A synchronous one is looked at only with SYNC.
         let kind = tester.read_number(pdo.at(2))?;
-        if cob & (OFF | 1 << 29) == 0 && mapped(tester, pdo).unwrap_or(0) > 0 && kind >= 254 {
+        if cob & (OFF | 1 << 29) == 0 && well_mapped(tester, pdo)? > 0 && kind >= 254 {
             let run = run_pdo_length(tester, (cob & 0x7FF) as u16);
             tester.restart(Command::ResetCommunication)?;
             return run;

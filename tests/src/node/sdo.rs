@@ -6,7 +6,8 @@ use canopen_master::sdo::message::{BlockSegment, Bytes, Content, Request, Respon
 use canopen_master::sdo::{AbortCode, Block, Channel, Options, Outcome};
 
 use super::tester::{Checked, SILENCE, Tester, reads, writes};
-use super::{Check, check, fail, skip};
+use super::words::{bytes, said, segment};
+use super::{Check, Problem, check, fail, skip};
 
 const DEVICE_TYPE: Address = Address::new(0x1000, 0);
 
@@ -200,7 +201,7 @@ fn text(tester: &mut Tester<'_>) -> Checked<(Address, Vec<u8>)> {
         match tester.upload(at, &tester.options(false))? {
             (Outcome::Done(5..), data) => return Ok((at, data)),
             (Outcome::Done(_) | Outcome::Aborted(_), _) => {}
-            (outcome, _) => return fail(format!("{at}: {outcome}")),
+            (outcome, _) => return tester.unreadable(at, outcome),
         }
     }
     skip("no text of more than 4 bytes can be read")
@@ -208,7 +209,10 @@ fn text(tester: &mut Tester<'_>) -> Checked<(Address, Vec<u8>)> {
 
 fn unchanged(tester: &mut Tester<'_>, at: Address, before: &[u8]) -> Checked {
     let after = tester.read(at)?;
-    if after == before { Ok(()) } else { fail(format!("{at} was {before:02X?} and is now {after:02X?}")) }
+    if after == before {
+        return Ok(());
+    }
+    fail(format!("{at} was {} and is now {}", bytes(before), bytes(&after)))
 }
 
 fn mandatory(tester: &mut Tester<'_>) -> Checked {
@@ -228,7 +232,7 @@ fn expedited_upload(tester: &mut Tester<'_>) -> Checked {
         {
             Ok(())
         }
-        other => fail(format!("{other:?}, an expedited answer of 4 bytes for {DEVICE_TYPE} expected")),
+        other => fail(format!("{}; an expedited answer of 4 bytes for {DEVICE_TYPE} expected", said(&other))),
     }
 }
 
@@ -308,11 +312,17 @@ fn abort_unanswered(tester: &mut Tester<'_>) -> Checked {
 fn begin_upload(tester: &mut Tester<'_>, at: Address) -> Checked<Option<u32>> {
     match tester.ask(Request::InitiateUpload { at })? {
         Response::InitiateUpload { at: found, content: Content::Segmented(size) } if found == at => Ok(size),
-        other => fail(format!("{other:?}, the beginning of a segmented upload of {at} expected")),
+        other => fail(format!("{}; the beginning of a segmented upload of {at} expected", said(&other))),
     }
 }
 
 fn segmented_upload(tester: &mut Tester<'_>) -> Checked {
+    let checked = run_segmented_upload(tester);
+    tester.bad_segments = matches!(checked, Err(Problem::Fail(_)));
+    checked
+}
+
+fn run_segmented_upload(tester: &mut Tester<'_>) -> Checked {
     let (at, data) = text(tester)?;
     let size = begin_upload(tester, at)?;
     let (mut got, mut toggle) = (Vec::<u8>::new(), false);
@@ -329,7 +339,8 @@ fn segmented_upload(tester: &mut Tester<'_>) -> Checked {
                 }
             }
             other => {
-                return fail(format!("{other:?}, a segment with toggle bit {} expected", u8::from(toggle)));
+                let toggle = u8::from(toggle);
+                return fail(format!("{}; a segment with toggle bit {toggle} expected", said(&other)));
             }
         }
         toggle = !toggle;
@@ -358,7 +369,7 @@ fn begin_download(tester: &mut Tester<'_>, at: Address, size: usize) -> Checked 
     match tester.ask(Request::InitiateDownload { at, content })? {
         Response::InitiateDownload { at: found } if found == at => Ok(()),
         Response::Abort { code, .. } => skip(format!("{at} is not taken in segments: {code}")),
-        other => fail(format!("{other:?}, the beginning of a segmented download to {at} expected")),
+        other => fail(format!("{}; the beginning of a segmented download to {at} expected", said(&other))),
     }
 }
 
@@ -371,7 +382,7 @@ fn segmented_download(tester: &mut Tester<'_>) -> Checked {
     begin_download(tester, at, value.len())?;
     match tester.ask(segment_of(false, &value))? {
         Response::DownloadSegment { toggle: false } => unchanged(tester, at, &value),
-        other => fail(format!("{other:?}, a confirmed segment with toggle bit 0 expected")),
+        other => fail(format!("{}; a confirmed segment with toggle bit 0 expected", said(&other))),
     }
 }
 
@@ -424,7 +435,7 @@ fn begin_block_upload(tester: &mut Tester<'_>, block_size: u8) -> Checked<(Addre
         }
         other => {
             tester.abort(at)?;
-            fail(format!("{other:?}, the beginning of a block upload of {at} expected"))
+            fail(format!("{}; the beginning of a block upload of {at} expected", said(&other)))
         }
     }
 }
@@ -434,8 +445,18 @@ fn block_upload(tester: &mut Tester<'_>) -> Checked {
     tester.abort(at)?;
     match tester.upload(at, &block(127, tester))? {
         (Outcome::Done(_), found) if found == data => Ok(()),
-        (Outcome::Done(_), found) => fail(format!("{found:02X?} came in blocks, {data:02X?} in segments")),
+        (Outcome::Done(_), found) => {
+            fail(format!("{} came in blocks, {} in segments", bytes(&found), bytes(&data)))
+        }
         (outcome, _) => fail(format!("block upload of {at}: {outcome}")),
+    }
+}
+
+/// What came, if anything.
+fn came(data: Option<&[u8]>) -> String {
+    match data {
+        Some(data) => Response::parse(data).map_or_else(|_| bytes(data), |answer| said(&answer)),
+        None => "no answer".into(),
     }
 }
 
@@ -445,7 +466,7 @@ fn block_segment(tester: &mut Tester<'_>) -> Checked<BlockSegment> {
     let data = tester.wait(Channel::default_of(tester.node()).response, until)?;
     match data.as_deref().and_then(BlockSegment::parse) {
         Some(segment) => Ok(segment),
-        None => fail(format!("{data:02X?} in place of a segment of a block")),
+        None => fail(format!("{} in place of a segment of a block", came(data.as_deref()))),
     }
 }
 
@@ -461,7 +482,8 @@ fn block_size_one(tester: &mut Tester<'_>) -> Checked {
     }
     match more {
         Some(data) => {
-            fail(format!("{data:02X?} after the only segment of a sub-block, before it was confirmed"))
+            let data = bytes(&data);
+            fail(format!("{data} after the only segment of a sub-block, before it was confirmed"))
         }
         None => Ok(()),
     }
@@ -479,7 +501,8 @@ fn retransmission(tester: &mut Tester<'_>) -> Checked {
     let again = again?;
     let expected = BlockSegment { sequence: 1, ..second };
     if again != expected {
-        return fail(format!("{again:?} came again, {expected:?} expected ({} bytes in all)", data.len()));
+        let (again, expected) = (segment(&again), segment(&expected));
+        return fail(format!("{again} came again; {expected} expected ({} bytes in all)", data.len()));
     }
     Ok(())
 }
@@ -501,7 +524,7 @@ fn begin_block_download(tester: &mut Tester<'_>, at: Address, size: usize) -> Ch
         Response::Abort { code, .. } => skip(format!("{at} is not taken in blocks: {code}")),
         other => {
             tester.abort(at)?;
-            fail(format!("{other:?}, the beginning of a block download to {at} expected"))
+            fail(format!("{}; the beginning of a block download to {at} expected", said(&other)))
         }
     }
 }
@@ -525,13 +548,10 @@ fn block_crc(tester: &mut Tester<'_>) -> Checked {
     let mut data = [0; 7];
     data.iter_mut().zip(&value).for_each(|(place, byte)| *place = *byte);
     let confirmed = tester.ask_raw(BlockSegment { sequence: 1, last: true, data }.encode())?;
-    if confirmed
-        .as_deref()
-        .map(Response::parse)
-        .is_none_or(|answer| !matches!(answer, Ok(Response::AckBlockDownload { sequence: 1, .. })))
-    {
+    let answer = confirmed.as_deref().map(Response::parse);
+    if !matches!(answer, Some(Ok(Response::AckBlockDownload { sequence: 1, .. }))) {
         tester.abort(at)?;
-        return fail(format!("{confirmed:02X?}, segment 1 confirmed expected"));
+        return fail(format!("{}; segment 1 confirmed expected", came(confirmed.as_deref())));
     }
     let right = value.iter().fold(0u16, |crc, &byte| {
         (0..8).fold(crc ^ u16::from(byte) << 8, |crc, _| crc << 1 ^ if crc >> 15 == 1 { 0x1021 } else { 0 })

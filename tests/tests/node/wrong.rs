@@ -66,6 +66,17 @@ fn taken_away(heard: &[Frame], frame: Frame, request: &[u8]) -> Vec<Frame> {
     vec![frame]
 }
 
+/// Another value than the device file's.
+fn other(heard: &[Frame], frame: Frame, request: &[u8]) -> Vec<Frame> {
+    if answers(heard, &frame, request) { with(&frame, |data| data[4] ^= 2) } else { vec![frame] }
+}
+
+/// The toggle bit is 1 in every segment.
+pub(super) fn no_toggle(heard: &[Frame], frame: Frame) -> Vec<Frame> {
+    let segment = answers(heard, &frame, &[0x60]) || answers(heard, &frame, &[0x70]);
+    if segment && frame.data()[0] & 0xE0 == 0 { with(&frame, |data| data[0] |= 0x10) } else { vec![frame] }
+}
+
 /// Every second one.
 fn slow(frame: &Frame) -> Vec<Frame> {
     use core::sync::atomic::{AtomicU32, Ordering};
@@ -158,13 +169,7 @@ pub(super) const WRONG: &[Wrong] = &[
         |heard, frame| if answers(heard, &frame, &[0xE0]) { vec![] } else { vec![frame] },
     ),
     wrong("sdo.segment-out-of-place", |_, frame| recoded(frame, 0x0504_0001, 0x0800_0000)),
-    wrong("sdo.segmented-upload", |heard, frame| {
-        if answers(heard, &frame, &[0x60]) && frame.data()[0] & 0xE0 == 0 {
-            with(&frame, |data| data[0] |= 0x10)
-        } else {
-            vec![frame]
-        }
-    }),
+    wrong("sdo.segmented-upload", no_toggle),
     // Announces one byte too many.
     wrong("sdo.segmented-upload", |heard, frame| {
         if answers(heard, &frame, &[0x40, 0x08, 0x10]) {
@@ -209,6 +214,13 @@ pub(super) const WRONG: &[Wrong] = &[
     wrong("object.1018.04.refuse", |heard, frame| {
         taken(heard, frame, &[0x23, 0x18, 0x10, 4], [0x60, 0x18, 0x10, 4, 0, 0, 0, 0])
     }),
+    wrong("file.vendor-number", |heard, frame| other(heard, frame, &[0x40, 0x18, 0x10, 1])),
+    wrong("file.product-number", |heard, frame| other(heard, frame, &[0x40, 0x18, 0x10, 2])),
+    wrong("file.revision-number", |heard, frame| other(heard, frame, &[0x40, 0x18, 0x10, 3])),
+    wrong("file.receive-pdos", |heard, frame| taken_away(heard, frame, &[0x40, 0x03, 0x14, 0])),
+    wrong("file.transmit-pdos", |heard, frame| taken_away(heard, frame, &[0x40, 0x03, 0x18, 0])),
+    wrong("object.1000.00.value", |heard, frame| other(heard, frame, &[0x40, 0x00, 0x10, 0])),
+    wrong("object.1800.01.value", |heard, frame| other(heard, frame, &[0x40, 0x00, 0x18, 1])),
     // TPDO 1 on the identifier of an SDO.
     wrong("pdo.parameters", |heard, frame| {
         if answers(heard, &frame, &[0x40, 0x00, 0x18, 1]) {
