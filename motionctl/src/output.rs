@@ -2,7 +2,7 @@
 
 use core::cell::RefCell;
 use std::io::{BufWriter, ErrorKind, IsTerminal, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use indicatif::{ProgressBar, ProgressStyle};
@@ -162,12 +162,7 @@ pub(crate) fn write_file<T>(
         file.flush().map_err(|error| trouble(&error))?;
         return Ok(done);
     }
-    // A link goes on leading to the file.
-    let path = path.canonicalize().unwrap_or_else(|_| path.into());
-    let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    // Whoever asked knows nothing of the file beside it.
-    std::fs::metadata(directory).map_err(|error| trouble(&error))?;
-    let mut file = tempfile::NamedTempFile::new_in(directory).map_err(|error| trouble(&error))?;
+    let (path, mut file) = beside(path).map_err(|error| trouble(&error))?;
     let mut writer = BufWriter::new(file.as_file_mut());
     let done = write(&mut writer)?;
     writer.flush().map_err(|error| trouble(&error))?;
@@ -186,6 +181,27 @@ pub(crate) fn write_file<T>(
 pub(crate) fn write_beside(path: &Path, bytes: &[u8]) -> Result<(), Exit> {
     let trouble = |error| Exit::file(&path.display().to_string(), &error);
     write_file(path, |file| file.write_all(bytes).map_err(trouble))
+}
+
+/// A new file beside the place of another, which is given with links followed. Trouble is told without the
+/// name of the new file.
+fn beside(path: &Path) -> std::io::Result<(PathBuf, tempfile::NamedTempFile)> {
+    // A link goes on leading to the file.
+    let path = path.canonicalize().unwrap_or_else(|_| path.into());
+    let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    std::fs::metadata(directory)?;
+    let file = tempfile::NamedTempFile::new_in(directory).map_err(|error| error.kind())?;
+    Ok((path, file))
+}
+
+/// Whether a file can be written in the end, asked before the work that it is to report.
+pub(crate) fn writable(path: &Path) -> Result<(), Exit> {
+    let tried = match std::fs::metadata(path) {
+        Ok(found) if found.is_dir() => Err(ErrorKind::IsADirectory.into()),
+        Ok(found) if !found.is_file() => Ok(()),
+        _ => beside(path).map(drop),
+    };
+    tried.map_err(|error| Exit::file(&path.display().to_string(), &error))
 }
 
 /// `1 curve`, `2 curves`.

@@ -369,3 +369,72 @@ fn a_block_upload_is_ended_on_the_wire() {
         }
     }
 }
+
+/// `conform` of an address, as a person has it.
+fn conform(bench: &Bench, node: &str, eds: &str, more: &[&str]) -> (Option<i32>, String, String) {
+    let output = Command::new(env!("CARGO_BIN_EXE_motionctl"))
+        .args(["conform", "--can", &bench.endpoint, "--node", node, "--eds", eds])
+        .args(more)
+        .current_dir(bench.directory.path())
+        .output()
+        .unwrap();
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    (output.status.code(), text(&output.stdout), text(&output.stderr))
+}
+
+/// There were more than 550 lines of skipped entries, one each and without their clause.
+#[test]
+fn conform_tells_what_it_skips_in_rows_with_reason_and_clause() {
+    let mut bench = Bench::new();
+    bench.sim(&["io", "--node", "5", "--write-eds", "io.eds"]);
+    let (status, told, _) = conform(&bench, "5", "io.eds", &["--timeout", "5"]);
+    assert_eq!(status, Some(0), "{told}");
+    let lines: Vec<_> = told.lines().collect();
+    assert!(lines.len() < 100, "{told}");
+    let skipped: Vec<_> = lines.iter().filter(|line| line.starts_with("skipped")).collect();
+    assert!(skipped.iter().all(|line| line.contains("(CiA 30") && line.ends_with(')')), "{skipped:#?}");
+    let row = "1600h to 1603h, 1800h to 1803h, 1A00h to 1A03h, ";
+    assert!(
+        skipped.iter().any(|line| line.contains(row) && line.contains(" entries: not written:")),
+        "{told}"
+    );
+}
+
+/// The report was found to be unwritable after the whole test, under the name of a temporary file.
+#[test]
+fn conform_asks_first_whether_its_report_can_be_written() {
+    let mut bench = Bench::new();
+    bench.sim(&["io", "--node", "5", "--write-eds", "io.eds"]);
+    // Nobody there: the bus must not even be looked for.
+    bench.endpoint = "socketcand:127.0.0.1:1/can0".into();
+    for (path, why) in [("nodir/x.xml", "No such file or directory"), (".", "is a directory")] {
+        let (status, told, error) = conform(&bench, "5", "io.eds", &["--junit", path]);
+        assert_eq!((status, told.as_str()), (Some(5), ""), "{error}");
+        assert!(error.starts_with(&format!("error: {path}: {why}")), "{error}");
+    }
+}
+
+/// Nothing was written then, so that an older report was taken for that of this run.
+#[test]
+fn conform_of_an_absent_node_reports_so() {
+    let mut bench = Bench::new();
+    bench.sim(&["io", "--node", "5", "--write-eds", "io.eds"]);
+    let path = bench.directory.path().join("report.xml");
+    std::fs::write(&path, "an older report").unwrap();
+    let (status, told, error) = conform(&bench, "9", "io.eds", &["--json", "--junit", "report.xml"]);
+    assert_eq!(status, Some(3), "{error}");
+    let why = "node 9 does not answer a request for 1000h";
+    let document: Value = serde_json::from_str(&told).unwrap();
+    assert_eq!(
+        (&document["node"], &document["passed"], &document["failed"]),
+        (&json!(9), &json!(0), &json!(1))
+    );
+    assert_eq!(document["cases"][0]["reason"], why);
+    let junit = std::fs::read_to_string(&path).unwrap();
+    assert!(junit.contains("tests=\"1\" failures=\"1\"") && junit.contains(why), "{junit}");
+    // Nor is a bus that is not there.
+    bench.endpoint = "socketcand:127.0.0.1:1/can0".into();
+    assert_eq!(conform(&bench, "9", "io.eds", &["--junit", "report.xml"]).0, Some(5));
+    let junit = std::fs::read_to_string(&path).unwrap();
+    assert!(junit.contains("127.0.0.1:1"), "{junit}");
+}

@@ -470,3 +470,14 @@ fn what_is_not_known_is_not_told_as_known() {
     assert_eq!(segments.len(), 4);
     assert!(segments.iter().all(|segment| segment.get("index").is_none()), "{objects:?}");
 }
+
+/// An FD frame was `123 Fd { bit_rate_switch: true, error_passive: false } [3] 11 22 33`.
+#[test]
+fn an_fd_frame_is_told_in_words() {
+    let log = "(0.1) can0 123##1112233\n(0.2) can0 124##0\n";
+    for more in [&[][..], &["--frames"]] {
+        let told = story(log, more);
+        assert!(told.contains("123 FD BRS [3] 11 22 33") && told.contains("124 FD [0]"), "{told}");
+        assert!(!told.contains('{'), "{told}");
+    }
+}

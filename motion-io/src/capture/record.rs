@@ -75,6 +75,21 @@ pub enum FrameKind {
     },
 }
 
+/// One word, of an FD frame with those of its bits that are set, as ISO 11898-1 calls them: `FD BRS ESI`.
+impl fmt::Display for FrameKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Data => "Data",
+            Self::Remote => "Remote",
+            Self::Error => "Error",
+            Self::Fd { bit_rate_switch: false, error_passive: false } => "FD",
+            Self::Fd { bit_rate_switch: true, error_passive: false } => "FD BRS",
+            Self::Fd { bit_rate_switch: false, error_passive: true } => "FD ESI",
+            Self::Fd { bit_rate_switch: true, error_passive: true } => "FD BRS ESI",
+        })
+    }
+}
+
 /// A frame of a capture: classic, FD, or an error report.
 #[derive(Clone, Copy)]
 pub struct Frame {
@@ -206,7 +221,7 @@ impl Eq for Frame {}
 impl fmt::Debug for Frame {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let width = if self.extended { 8 } else { 3 };
-        write!(f, "{:0width$X} {:?} [{}]", self.id, self.kind, self.len)?;
+        write!(f, "{:0width$X} {} [{}]", self.id, self.kind, self.len)?;
         self.data().iter().try_for_each(|byte| write!(f, " {byte:02X}"))
     }
 }

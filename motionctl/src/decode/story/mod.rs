@@ -300,7 +300,7 @@ impl Teller for Story<'_> {
                     &format!("error report: class {:X}h, {}", frame.id, bytes(frame.data())),
                 );
             } else if self.cycle(Cycle::Identifier(number, frame.id, frame.extended), time, frame.data()).0 {
-                self.say(time, bus, "bus", &format!("CAN FD frame {frame:?}"));
+                self.say(time, bus, "bus", &format!("CAN frame {frame:?}"));
             }
             return;
         }

@@ -1,5 +1,7 @@
 //! `motionctl conform`: a small conformance test of one node.
 
+mod tell;
+
 use core::time::Duration;
 use std::path::PathBuf;
 
@@ -8,13 +10,15 @@ use clap::Args;
 use conformance::node::{Config, Line, TestError, checks, test};
 use conformance::report::{Case, Outcome, counts, json as report_json, junit};
 use motion_io::can::open;
+use motion_io::endpoint::CanEndpoint;
 use serde_json::json;
 
 use crate::can::cli::CanLine;
 use crate::can::session::{answer_time, endpoint, node_id};
 use crate::cli::Global;
 use crate::exit::Exit;
-use crate::output::{Output, write_beside};
+use crate::output::{Output, writable, write_beside};
+use tell::Teller;
 
 /// Where we are the adapter, a host has so long to open its end.
 const PEER: Duration = Duration::from_secs(10);
@@ -49,16 +53,26 @@ pub(crate) fn run(out: &Output, global: &Global, arguments: &Conform) -> Result<
         permitted: global.yes,
     };
     let endpoint = endpoint(global, &arguments.line)?;
-    let trouble = |error: std::io::Error| Exit::trouble(format!("{endpoint}: {error}"));
-    let mut port = open(&endpoint).map_err(|error| Exit::trouble(error.to_string()))?;
-    if !port.wait_for_peer(PEER).map_err(trouble)? {
-        return Err(Exit::trouble(format!("{endpoint}: nobody has opened the other end")));
+    if let Some(path) = &arguments.junit {
+        writable(path)?;
     }
-    let cases = test(&mut Line::new(port), &config, |case| tell(out, case)).map_err(|error| match error {
-        TestError::Io(error) => trouble(error),
-        TestError::Silent(_) => Exit { status: 3, message: error.to_string() },
-        _ => Exit::usage(format!("{error}: --yes gives it")),
-    })?;
+    let mut cases = Vec::new();
+    let mut teller = Teller::new(out);
+    let ended = test_over(&endpoint, &config, |case| {
+        teller.tell(case);
+        cases.push(case.clone());
+    });
+    teller.finish();
+    // A report of what came to no end says so, that nobody takes an older one for it.
+    if let Err(exit) = &ended {
+        cases.push(Case {
+            id: "conform.ended".into(),
+            title: "The test comes to its end".into(),
+            clause: String::new(),
+            outcome: Outcome::Failed(exit.message.clone()),
+            time: Duration::ZERO,
+        });
+    }
     if let Some(path) = &arguments.junit {
         write_beside(path, junit(&format!("node {}", arguments.node), &cases).as_bytes())?;
     }
@@ -71,18 +85,26 @@ pub(crate) fn run(out: &Output, global: &Global, arguments: &Conform) -> Result<
         "skipped": skipped,
         "cases": report_json(&cases),
     });
-    out.document(document, || println!("{passed} passed, {failed} failed, {skipped} skipped"));
+    out.document(document, || {
+        if ended.is_ok() {
+            println!("{passed} passed, {failed} failed, {skipped} skipped");
+        }
+    });
+    ended?;
     if failed == 0 { Ok(()) } else { Err(Exit::check(format!("{failed} of {} cases failed", cases.len()))) }
 }
 
-/// What passed of the many objects is only counted.
-fn tell(out: &Output, case: &Case) {
-    let Case { id, title, clause, outcome, .. } = case;
-    match outcome {
-        Outcome::Passed if id.starts_with("object.") => {}
-        Outcome::Passed => out.say(&format!("passed   {id}: {title} ({clause})")),
-        Outcome::Failed(why) => out.say(&format!("FAILED   {id}: {title} ({clause})\n         {why}")),
-        Outcome::Skipped(why) => out.say(&format!("skipped  {id}: {why}")),
+fn test_over(endpoint: &CanEndpoint, config: &Config<'_>, told: impl FnMut(&Case)) -> Result<(), Exit> {
+    let trouble = |error: std::io::Error| Exit::trouble(format!("{endpoint}: {error}"));
+    let mut port = open(endpoint).map_err(|error| Exit::trouble(error.to_string()))?;
+    if !port.wait_for_peer(PEER).map_err(trouble)? {
+        return Err(Exit::trouble(format!("{endpoint}: nobody has opened the other end")));
+    }
+    match test(&mut Line::new(port), config, told) {
+        Ok(_) => Ok(()),
+        Err(TestError::Io(error)) => Err(trouble(error)),
+        Err(error @ TestError::Silent(_)) => Err(Exit { status: 3, message: error.to_string() }),
+        Err(error) => Err(Exit::usage(format!("{error}: --yes gives it"))),
     }
 }
 
