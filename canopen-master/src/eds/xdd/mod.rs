@@ -140,7 +140,7 @@ mod tests {
     fn findings_quote_the_standard_of_xml() {
         let object = "<CANopenObject index=\"1000\" name=\"a\" dataType=\"0005\" accessType=\"ro\" defaultValue=\"256\" />";
         let found = super::super::check(&read(file(object, "").as_bytes()).unwrap());
-        let clauses: alloc::vec::Vec<_> = found.iter().map(|finding| finding.clause()).collect();
+        let clauses: alloc::vec::Vec<_> = found.iter().map(super::super::Diagnostic::clause).collect();
         assert_eq!(clauses, ["CiA 301, 7.5.2", "CiA 301, 7.5.2", "CiA 311"], "{found:?}");
     }
 
