@@ -18,6 +18,7 @@ mod model;
 mod name;
 mod objects;
 mod reader;
+mod standard;
 mod types;
 mod update;
 mod value;
@@ -34,6 +35,7 @@ pub use concise::{ConciseEntry, ConciseError, ConciseValueError, encode_concise,
 pub use diagnostic::{Diagnostic, Rule, Severity};
 pub use encoding::Encoding;
 pub use model::{Device, Entry, Fields, Module, Object, Section};
+pub use standard::{StandardObject, standard_name, standard_object, standard_sub_object};
 pub use types::{Access, List, ObjectType, PdoMapping};
 pub use value::{Number, ValueError, fit, from_bytes, to_bytes};
 pub use writer::{lost_in_eds, write_eds};

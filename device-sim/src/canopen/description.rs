@@ -1,7 +1,9 @@
 //! The device file of a virtual node, made of its objects.
 
 use canopen_master::data_type::DataType;
-use canopen_master::eds::{Access, Device, Entry, Fields, Object, ObjectType, PdoMapping};
+use canopen_master::eds::{
+    Access, Device, Entry, Fields, Object, ObjectType, PdoMapping, standard_name, standard_object,
+};
 
 use canopen_master::slave::EMERGENCIES;
 use pdo::Address;
@@ -65,10 +67,10 @@ pub fn device_file<D: Behaviour>(node: &Node<D>, name: &str) -> Device {
         match device.objects.last_mut().filter(|object| object.index == at.index) {
             Some(object) => {
                 if object.subs.is_empty() {
-                    object.own.object_type = ObjectType::RECORD;
                     let mut first = core::mem::replace(&mut object.own, Entry::new(0));
-                    object.own.name = format!("{:04X}h", at.index);
-                    object.own.object_type = ObjectType::RECORD;
+                    object.own.name = parameter_name(at.index, None);
+                    object.own.object_type = composed(at.index);
+                    first.name = parameter_name(at.index, Some(0));
                     first.object_type = ObjectType::VAR;
                     object.insert(first);
                 }
@@ -77,6 +79,7 @@ pub fn device_file<D: Behaviour>(node: &Node<D>, name: &str) -> Device {
             None => {
                 let mut object = Object::new(at.index);
                 object.own = described;
+                object.own.name = parameter_name(at.index, None);
                 device.objects.push(object);
             }
         }
@@ -112,9 +115,23 @@ fn everything<D: Behaviour>(node: &Node<D>) -> Objects {
     all
 }
 
+/// As the standards have it, otherwise its number.
+fn parameter_name(index: u16, sub: Option<u8>) -> String {
+    standard_name(index, sub).unwrap_or_else(|| match sub {
+        Some(sub) => format!("{index:04X}h:{sub:02X}"),
+        None => format!("{index:04X}h"),
+    })
+}
+
+/// What an object with sub-objects is.
+fn composed(index: u16) -> ObjectType {
+    let known = standard_object(index).map(|object| object.object_type);
+    known.filter(|known| *known != ObjectType::VAR).unwrap_or(ObjectType::RECORD)
+}
+
 fn describe(index: u16, sub: u8, object: &objects::Entry) -> Entry {
     let mut entry = Entry::new(sub);
-    entry.name = format!("{index:04X}h:{sub:02X}");
+    entry.name = parameter_name(index, Some(sub));
     entry.object_type =
         if object.data_type == DataType::DOMAIN { ObjectType::DOMAIN } else { ObjectType::VAR };
     entry.data_type = Some(object.data_type);

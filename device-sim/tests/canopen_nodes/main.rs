@@ -6,9 +6,10 @@ mod pdos;
 
 use core::time::Duration;
 
+use canopen_master::eds::{self, ObjectType};
 use canopen_master::sdo::{AbortCode, Options, Outcome};
 use device_sim::can::{self, Faults};
-use device_sim::canopen::{FileNode, Ld2000, RemoteIo};
+use device_sim::canopen::{FileNode, Ld2000, RemoteIo, device_file};
 use pdo::Frame;
 
 use bench::{Bench, MS, START, SYNC, id};
@@ -82,6 +83,36 @@ fn a_node_without_address_gets_one() {
     bench.send(Frame::standard(0x7E5, [0x04, 0, 0, 0, 0, 0, 0, 0]));
     assert_eq!(bench.heard(), ["709#00"]);
     assert_eq!(bench.node.node(), id(9));
+}
+
+/// Its own file violates nothing, and calls the objects of the standards what they are called there.
+#[test]
+fn device_files_have_the_names_and_kinds_of_the_standards() {
+    let io = device_file(&RemoteIo::node(id(5), 1, false), "io");
+    let drive = device_file(&Ld2000::node(id(5), 1), "drive");
+    for device in [&io, &drive] {
+        let reading = eds::read(eds::write_eds(device).as_bytes()).unwrap();
+        let findings: Vec<String> = eds::check(&reading).iter().map(ToString::to_string).collect();
+        assert_eq!(findings, [""; 0]);
+        for object in device.objects.iter().filter(|object| object.index < 0x2000) {
+            let numbers = object.entries().iter().map(|entry| &entry.name).chain([&object.own.name]);
+            assert!(
+                numbers.clone().all(|name| !name.contains("h:") && !name.starts_with("10")),
+                "{object:?}"
+            );
+        }
+        for index in [0x1003, 0x1010, 0x1011, 0x1016] {
+            assert_eq!(device.object(index).unwrap().own.object_type, ObjectType::ARRAY, "{index:04X}h");
+        }
+        assert_eq!(device.object(0x1018).unwrap().own.object_type, ObjectType::RECORD);
+        assert_eq!(device.object(0x1017).unwrap().name(), "Producer heartbeat time");
+        assert_eq!(device.entry(0x1018, 1).unwrap().name, "Vendor-ID");
+        assert_eq!(device.entry(0x1800, 1).unwrap().name, "COB-ID used by TPDO");
+    }
+    for index in [0x6000, 0x6200, 0x6401, 0x6411] {
+        assert_eq!(io.object(index).unwrap().own.object_type, ObjectType::ARRAY, "{index:04X}h");
+    }
+    assert_eq!(drive.object(0x6040).unwrap().name(), "Controlword");
 }
 
 #[test]

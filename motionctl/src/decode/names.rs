@@ -20,124 +20,6 @@ pub(crate) struct Names {
     linmot: Cell<u128>,
 }
 
-/// Objects of the standards: index, sub-indices, name, type of each sub-index but the number of
-/// entries at 0.
-type Known = (u16, u16, &'static str, DataType);
-
-const U8: DataType = DataType::UNSIGNED8;
-const U16: DataType = DataType::UNSIGNED16;
-const U32: DataType = DataType::UNSIGNED32;
-const I8: DataType = DataType::INTEGER8;
-const I16: DataType = DataType::INTEGER16;
-const I32: DataType = DataType::INTEGER32;
-const TEXT: DataType = DataType::VISIBLE_STRING;
-
-/// Sorted by index.
-const STANDARD: &[Known] = &[
-    (0x1000, 0x1000, "device type", U32),
-    (0x1001, 0x1001, "error register", U8),
-    (0x1002, 0x1002, "manufacturer status register", U32),
-    (0x1003, 0x1003, "error history", U32),
-    (0x1005, 0x1005, "COB-ID of SYNC", U32),
-    (0x1006, 0x1006, "SYNC period in us", U32),
-    (0x1007, 0x1007, "SYNC window in us", U32),
-    (0x1008, 0x1008, "device name", TEXT),
-    (0x1009, 0x1009, "hardware version", TEXT),
-    (0x100A, 0x100A, "software version", TEXT),
-    (0x100C, 0x100C, "guard time in ms", U16),
-    (0x100D, 0x100D, "life time factor", U8),
-    (0x1010, 0x1010, "store parameters", U32),
-    (0x1011, 0x1011, "restore defaults", U32),
-    (0x1012, 0x1012, "COB-ID of TIME", U32),
-    (0x1014, 0x1014, "COB-ID of EMCY", U32),
-    (0x1015, 0x1015, "EMCY inhibit time in 100 us", U16),
-    (0x1016, 0x1016, "heartbeat to watch", U32),
-    (0x1017, 0x1017, "heartbeat period in ms", U16),
-    (0x1018, 0x1018, "identity", U32),
-    (0x1019, 0x1019, "SYNC counter overflow", U8),
-    (0x1020, 0x1020, "verify configuration", U32),
-    (0x1029, 0x1029, "error behaviour", U8),
-    (0x1200, 0x127F, "SDO server", U32),
-    (0x1280, 0x12FF, "SDO client", U32),
-    (0x1400, 0x15FF, "RPDO", U32),
-    (0x1600, 0x17FF, "mapping of RPDO", U32),
-    (0x1800, 0x19FF, "TPDO", U32),
-    (0x1A00, 0x1BFF, "mapping of TPDO", U32),
-    (0x1F50, 0x1F50, "program data", DataType::DOMAIN),
-    (0x1F51, 0x1F51, "program control", U8),
-    (0x1F56, 0x1F56, "program identification", U32),
-    (0x1F57, 0x1F57, "flash status", U32),
-    (0x1F80, 0x1F80, "NMT start-up", U32),
-    (0x6000, 0x6000, "digital inputs", U8),
-    (0x6200, 0x6200, "digital outputs", U8),
-    (0x6401, 0x6401, "analogue inputs", I16),
-    (0x6411, 0x6411, "analogue outputs", I16),
-    (0x603F, 0x603F, "error code", U16),
-    (0x6040, 0x6040, "control word", U16),
-    (0x6041, 0x6041, "status word", U16),
-    (0x605A, 0x605A, "quick stop option", I16),
-    (0x6060, 0x6060, "mode", I8),
-    (0x6061, 0x6061, "mode display", I8),
-    (0x6062, 0x6062, "position demand", I32),
-    (0x6063, 0x6063, "position actual, internal", I32),
-    (0x6064, 0x6064, "position actual", I32),
-    (0x6065, 0x6065, "following error window", U32),
-    (0x6067, 0x6067, "position window", U32),
-    (0x606B, 0x606B, "velocity demand", I32),
-    (0x606C, 0x606C, "velocity actual", I32),
-    (0x6071, 0x6071, "target torque", I16),
-    (0x6072, 0x6072, "maximum torque", U16),
-    (0x6073, 0x6073, "maximum current", U16),
-    (0x6077, 0x6077, "torque actual", I16),
-    (0x6078, 0x6078, "current actual", I16),
-    (0x607A, 0x607A, "target position", I32),
-    (0x607C, 0x607C, "home offset", I32),
-    (0x607D, 0x607D, "software position limit", I32),
-    (0x607F, 0x607F, "maximum profile velocity", U32),
-    (0x6080, 0x6080, "maximum motor speed", U32),
-    (0x6081, 0x6081, "profile velocity", U32),
-    (0x6083, 0x6083, "profile acceleration", U32),
-    (0x6084, 0x6084, "profile deceleration", U32),
-    (0x6085, 0x6085, "quick stop deceleration", U32),
-    (0x6098, 0x6098, "homing method", I8),
-    (0x6099, 0x6099, "homing speeds", U32),
-    (0x609A, 0x609A, "homing acceleration", U32),
-    (0x60C1, 0x60C1, "interpolation data", I32),
-    (0x60C2, 0x60C2, "interpolation period", I8),
-    (0x60F4, 0x60F4, "following error actual", I32),
-    (0x60FD, 0x60FD, "digital inputs", U32),
-    (0x60FE, 0x60FE, "digital outputs", U32),
-    (0x60FF, 0x60FF, "target velocity", I32),
-    (0x6502, 0x6502, "supported modes", U32),
-];
-
-fn standard(at: Address) -> Option<&'static Known> {
-    STANDARD.iter().find(|(from, to, ..)| (*from..=*to).contains(&at.index))
-}
-
-/// What a sub-index of a communication parameter is called.
-const fn sub_name(at: Address) -> Option<(&'static str, DataType)> {
-    Some(match (at.index, at.sub) {
-        (0x1018, 1) => ("vendor", U32),
-        (0x1018, 2) => ("product", U32),
-        (0x1018, 3) => ("revision", U32),
-        (0x1018, 4) => ("serial number", U32),
-        (0x1400..=0x15FF | 0x1800..=0x19FF, 1) => ("identifier", U32),
-        (0x1400..=0x15FF | 0x1800..=0x19FF, 2) => ("transmission type", U8),
-        (0x1800..=0x19FF, 3) => ("inhibit time in 100 us", U16),
-        (0x1400..=0x15FF | 0x1800..=0x19FF, 5) => ("event timer in ms", U16),
-        (0x1800..=0x19FF, 6) => ("SYNC start value", U8),
-        (0x1600..=0x17FF | 0x1A00..=0x1BFF, 0) => ("number of objects", U8),
-        (0x1200..=0x12FF, 1) => ("identifier to the server", U32),
-        (0x1200..=0x12FF, 2) => ("identifier from the server", U32),
-        (0x1200..=0x12FF, 3) => ("node", U8),
-        (0x1016 | 0x1018 | 0x1003 | 0x1010 | 0x1011 | 0x1029 | 0x6000 | 0x6200 | 0x6401 | 0x6411, 0) => {
-            ("number of entries", U8)
-        }
-        _ => return None,
-    })
-}
-
 /// Number of the PDO that a communication or mapping parameter belongs to.
 const fn pdo_number(index: u16) -> Option<u16> {
     match index {
@@ -220,12 +102,12 @@ impl Names {
         {
             return format!("{text} {name}");
         }
-        let Some((_, _, name, _)) = standard(at) else { return text };
+        let Some(name) = eds::standard_object(index).map(|object| object.words) else { return text };
         text.push_str(&format!(" {name}"));
         if let Some(number) = pdo_number(index) {
             text.push_str(&format!(" {number}"));
         }
-        match sub_name(at) {
+        match eds::standard_sub_object(index, sub) {
             Some((name, _)) => text.push_str(&format!(", {name}")),
             None if matches!(index, 0x1600..=0x17FF | 0x1A00..=0x1BFF) => {
                 text.push_str(&format!(", object {sub}"));
@@ -248,7 +130,9 @@ impl Names {
     fn data_type(&self, node: NodeId, at: Address) -> Option<DataType> {
         match self.entry(node, at).and_then(|entry| entry.data_type) {
             Some(known) => Some(DataType(known.0)),
-            None => sub_name(at).map(|(_, known)| known).or_else(|| standard(at).map(|(.., known)| *known)),
+            None => eds::standard_sub_object(at.index, at.sub)
+                .map(|(_, known)| known)
+                .or_else(|| eds::standard_object(at.index).map(|object| object.data_type)),
         }
     }
 
@@ -371,7 +255,7 @@ fn special(at: Address, data: &[u8]) -> Option<String> {
         }
         (0x1600..=0x17FF | 0x1A00..=0x1BFF, 1..) => {
             let object = Mapped::from_entry(u32()?);
-            let name = standard(object.address()).map_or("", |(_, _, name, _)| name);
+            let name = eds::standard_object(object.index).map_or("", |known| known.words);
             let space = if name.is_empty() { "" } else { " " };
             format!("{:04X}h:{:02X}{space}{name}, {} bits", object.index, object.sub, object.bits)
         }
