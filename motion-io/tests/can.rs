@@ -112,8 +112,9 @@ fn socketcand_says_what_is_wrong() {
     assert!(said.contains("the server does not open the bus \"can7\""), "{said}");
     let address = served.address.clone();
     drop(served);
-    let said = say(&format!("socketcand:{address}/can0"));
-    assert!(said.starts_with(&format!("tcp:{address}: ")), "{said}");
+    let endpoint = format!("socketcand:{address}/can0");
+    let said = say(&endpoint);
+    assert!(said.starts_with(&format!("{endpoint}: ")), "{said}");
 }
 
 #[test]
