@@ -30,6 +30,8 @@ const AXES: u8 = 6;
 const CYCLE: Duration = Duration::from_millis(6);
 /// Until scan and boot are over, which is not measured.
 const START: usize = 500;
+/// Until then no axis moves: without its drive it takes no orders.
+const BOOTED: usize = 300;
 const MEASURED: usize = 5_000;
 const MAXIMUM: i32 = 500_000;
 const FAR: i32 = 400_000;
@@ -38,6 +40,7 @@ const FAR: i32 = 400_000;
 struct Shuttle {
     power: Vec<Power>,
     moves: Vec<MoveAbsolute>,
+    cycles: usize,
     arrived: u32,
     failed: u32,
 }
@@ -47,6 +50,7 @@ impl Shuttle {
         Self {
             power: (1..=AXES).map(|axis| Power { enable: true, ..Power::new(axis) }).collect(),
             moves: (1..=AXES).map(MoveAbsolute::new).collect(),
+            cycles: 0,
             arrived: 0,
             failed: 0,
         }
@@ -55,8 +59,9 @@ impl Shuttle {
 
 impl Application for Shuttle {
     fn cycle(&mut self, plc: &mut Plc<'_>) {
+        self.cycles += 1;
         for (power, mover) in self.power.iter_mut().zip(&mut self.moves) {
-            let on = power.call(plc).expect("activated");
+            let on = power.call(plc).expect("activated") && self.cycles > BOOTED;
             let outputs = mover.call(plc);
             self.arrived += u32::from(outputs.done);
             self.failed += u32::from(outputs.error);
