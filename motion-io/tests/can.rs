@@ -104,6 +104,19 @@ fn socketcand_both_ways() {
     }
 }
 
+/// As soon as a client is open, the frames on its bus reach it.
+#[test]
+fn a_frame_right_after_raw_mode_is_not_lost() {
+    let bus = VirtualBus::new(1_000_000, Faults::NONE);
+    let served = Served::new(&bus);
+    let mut inside = bus.connect();
+    for number in 0..50u8 {
+        let mut client = endpoint(&format!("socketcand:{}/can0", served.address));
+        inside.send(&Frame::standard(0x100, [number])).unwrap();
+        assert_eq!(next(&mut *client).data(), [number]);
+    }
+}
+
 #[test]
 fn socketcand_says_what_is_wrong() {
     let served = Served::new(&VirtualBus::new(1_000_000, Faults::NONE));

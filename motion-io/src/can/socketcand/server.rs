@@ -5,7 +5,7 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
 use std::io::{self, Write};
 use std::net::{TcpListener, TcpStream};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::SystemTime;
 
 use super::super::{BusError, BusEvent, BusState, CanPort, Event, VirtualBus, VirtualPort};
@@ -74,10 +74,22 @@ impl Server {
 /// One client, as both of its threads see it.
 struct Session {
     stream: TcpStream,
-    /// Both threads write.
-    out: Mutex<TcpStream>,
-    raw: AtomicBool,
+    out: Mutex<Out>,
     ended: AtomicBool,
+}
+
+/// What both threads write to.
+struct Out {
+    stream: TcpStream,
+    /// The client hears frames. It changes with the answer that says so: a client may be sent a frame as
+    /// soon as it has read that answer.
+    raw: bool,
+}
+
+impl Out {
+    fn say(&mut self, text: &str) -> io::Result<()> {
+        self.stream.write_all(text.as_bytes())
+    }
 }
 
 impl Session {
@@ -87,12 +99,11 @@ impl Session {
         stream.set_read_timeout(Some(POLL))?;
         stream.set_write_timeout(Some(WRITE))?;
         let session = Self {
-            out: Mutex::new(stream.try_clone()?),
+            out: Mutex::new(Out { stream: stream.try_clone()?, raw: false }),
             stream,
-            raw: AtomicBool::new(false),
             ended: AtomicBool::new(false),
         };
-        session.say("< hi >")?;
+        session.out().say("< hi >")?;
         std::thread::scope(|scope| {
             let mut station = None;
             let done = session.read(buses, stop, |port| {
@@ -108,8 +119,14 @@ impl Session {
         })
     }
 
-    fn say(&self, text: &str) -> io::Result<()> {
-        self.out.lock().unwrap_or_else(PoisonError::into_inner).write_all(text.as_bytes())
+    fn out(&self) -> MutexGuard<'_, Out> {
+        self.out.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn set_raw(&self, raw: bool) -> io::Result<()> {
+        let mut out = self.out();
+        out.raw = raw;
+        out.say("< ok >")
     }
 
     fn read(
@@ -139,32 +156,26 @@ impl Session {
                 let Some(message) = messages.push(byte) else { continue };
                 let mut words = message.split_whitespace();
                 match (words.next().unwrap_or(""), &mut port) {
-                    ("echo", _) => self.say("< echo >")?,
+                    ("echo", _) => self.out().say("< echo >")?,
                     ("open", None) => {
                         let name = words.next().unwrap_or("");
                         let Some((_, bus)) = buses.iter().find(|(known, _)| known == name) else {
-                            return self.say("< error could not open bus >");
+                            return self.out().say("< error could not open bus >");
                         };
                         let new = bus.connect();
                         open(new.clone());
                         port = Some(new);
-                        self.say("< ok >")?;
+                        self.out().say("< ok >")?;
                     }
-                    ("rawmode", Some(_)) => {
-                        self.say("< ok >")?;
-                        self.raw.store(true, Ordering::Relaxed);
-                    }
-                    ("bcmmode", Some(_)) => {
-                        self.raw.store(false, Ordering::Relaxed);
-                        self.say("< ok >")?;
-                    }
+                    ("rawmode", Some(_)) => self.set_raw(true)?,
+                    ("bcmmode", Some(_)) => self.set_raw(false)?,
                     (command @ ("send" | "sendrtr"), Some(port)) => {
                         match parse_send(words, command == "sendrtr") {
                             Some(frame) => self.send(port, &frame, stop)?,
-                            None => self.say("< error syntax >")?,
+                            None => self.out().say("< error syntax >")?,
                         }
                     }
-                    _ => self.say("< error unknown command >")?,
+                    _ => self.out().say("< error unknown command >")?,
                 }
             }
         }
@@ -191,12 +202,13 @@ impl Session {
     fn forward(&self, mut port: VirtualPort) {
         let mut raw = false;
         while !self.ended.load(Ordering::Relaxed) {
-            if self.raw.load(Ordering::Relaxed) != raw {
+            let Ok(event) = port.receive(POLL) else { break };
+            let changed = self.out().raw != raw;
+            if changed {
                 raw = !raw;
                 std::thread::sleep(AFTER_RAWMODE);
             }
-            let Ok(event) = port.receive(POLL) else { break };
-            let Some(event) = event.filter(|_| self.raw.load(Ordering::Relaxed)) else { continue };
+            let Some(event) = event.filter(|_| raw) else { continue };
             let at = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
             let text = match event {
                 Event::Frame(frame) => frame_message(&frame, at),
@@ -212,7 +224,7 @@ impl Session {
                     format!("< error {class:03X} {}.{:06} >", at.as_secs(), at.subsec_micros())
                 }
             };
-            if self.say(&text).is_err() {
+            if self.out().say(&text).is_err() {
                 break;
             }
         }
