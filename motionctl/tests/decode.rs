@@ -275,7 +275,7 @@ fn the_readme_shows_a_real_story() {
 }
 
 /// The story of a log.
-fn story(log: &str, more: &[&str]) -> String {
+fn story(log: impl AsRef<[u8]>, more: &[&str]) -> String {
     let bench = Bench::new();
     std::fs::write(bench.path("log"), log).unwrap();
     let mut arguments = vec!["decode", "log"];
@@ -427,13 +427,14 @@ fn objects_of_a_linmot_drive_in_words() {
         "8 frames: 4 sdo-request, 3 sdo-response, 1 sdo-abort",
     ];
     expect_lines(&story(traffic, &["--linmot", "3"]), &words);
-    let learned = story(&format!("{vendor}{traffic}"), &[]);
+    let learned = story(format!("{vendor}{traffic}"), &[]);
     assert!(words[..4].iter().all(|line| learned.contains(line)), "{learned}");
     let unknown = story(traffic, &[]);
     assert!(!unknown.contains("UPID"), "{unknown}");
 }
 
-/// The bus that spoke second but was described first had no name.
+/// The bus that spoke second but was described first had no name, and in the counts at the end that of the
+/// other.
 #[test]
 fn every_bus_has_its_name_in_whatever_order_they_speak() {
     let block = |kind: u32, body: &[u8]| {
@@ -447,11 +448,14 @@ fn every_bus_has_its_name_in_whatever_order_they_speak() {
     };
     let head = [&0x1A2B_3C4D_u32.to_le_bytes()[..], &[1, 0, 0, 0], &[0xFF; 8]].concat();
     let file =
-        [block(0x0A0D_0D0A, &head), interface(b"canA"), interface(b"canB"), packet(1), packet(0)].concat();
+        [block(0x0A0D_0D0A, &head), interface(b"canA"), interface(b"canB"), packet(1), packet(0), packet(0)]
+            .concat();
+    let told = story(&file, &[]);
+    assert!(told.contains("  canA node 1 heartbeat, at last operational: 2 times"), "{told}");
     let objects = objects(&file, &[]);
     let buses: Vec<_> =
         objects.iter().filter(|object| has(object, json!({ "id": 0x701 }))).map(|o| &o["bus"]).collect();
-    assert_eq!(buses, ["canB", "canA"]);
+    assert_eq!(buses, ["canB", "canA", "canA"]);
 }
 
 /// `what repeated itself` was missing above a count of transfers alone; frames of a transfer that

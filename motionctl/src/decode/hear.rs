@@ -51,6 +51,16 @@ impl Ear {
         &self.tracer
     }
 
+    /// The name of a bus by its number, where it has one.
+    pub(crate) fn bus_name(&self, number: u16) -> Option<&str> {
+        self.buses.get(usize::from(number)).and_then(Option::as_deref)
+    }
+
+    /// Whether a bus has to be named.
+    pub(crate) const fn has_several_buses(&self) -> bool {
+        self.buses.len() > 1
+    }
+
     /// The frame that the reader of a capture has just read.
     pub(crate) fn hear_next<R: std::io::Read>(
         &mut self,
@@ -105,7 +115,7 @@ impl Ear {
     pub(crate) fn finish(&mut self, teller: &mut impl Teller) {
         self.tracer.finish();
         while let Some(transfer) = self.tracer.poll_event() {
-            let bus = self.buses.get(usize::from(transfer.bus)).and_then(Option::as_deref);
+            let bus = self.bus_name(transfer.bus);
             teller.transfer(&transfer, ended(&transfer).filter(|_| !self.deltas), bus);
         }
     }

@@ -193,13 +193,13 @@ fn decode_file(
             lb2::decode(out.json, file, reader, totals, stdout, |damage| report(file, damage))
         }
         Capture::Can(reader) => {
-            let mut ear = Ear::new(names, args.reading.can_link);
+            let ear = &mut Ear::new(names, args.reading.can_link);
             if out.json {
-                decode_can(file, reader, &mut ear, &mut Json::new(names), totals, stdout)
+                decode_can(file, reader, ear, &mut Json::new(names), totals, stdout)
             } else {
                 let mut story = Story::new(names, args.frames);
-                decode_can(file, reader, &mut ear, &mut story, totals, stdout)?;
-                story.end(ear.tracer());
+                decode_can(file, reader, ear, &mut story, totals, stdout)?;
+                story.end(ear);
                 Ok(stdout.write_all(story.text())?)
             }
         }

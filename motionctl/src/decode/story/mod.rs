@@ -38,8 +38,6 @@ pub(crate) struct Story<'a> {
     out: Vec<u8>,
     /// Time of the first frame, where times are times of day.
     start: Option<i64>,
-    /// Whether a bus has to be named.
-    buses: Vec<String>,
     last_time: Option<i64>,
     /// Time of the line told last.
     latest: Option<i64>,
@@ -73,7 +71,6 @@ impl<'a> Story<'a> {
             every_frame,
             out: Vec::new(),
             start: None,
-            buses: Vec::new(),
             last_time: None,
             latest: None,
             cycles: BTreeMap::new(),
@@ -279,11 +276,6 @@ impl Teller for Story<'_> {
         }
         self.last_time = time;
         let number = number_of(record);
-        if let Some(name) = bus
-            && self.buses.len() <= usize::from(number)
-        {
-            self.buses.push(name.to_owned());
-        }
         if self.every_frame {
             self.raw(record, time, bus, kind);
         }

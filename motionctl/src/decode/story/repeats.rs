@@ -3,8 +3,9 @@
 use std::io::Write as _;
 
 use canopen_master::NodeId;
-use canopen_master::trace::{PdoDirection, Tracer};
+use canopen_master::trace::PdoDirection;
 
+use super::super::Ear;
 use super::Story;
 use super::rhythm::Rhythm;
 
@@ -85,7 +86,7 @@ impl Story<'_> {
     }
 
     /// The counts, when the capture has ended.
-    pub(in super::super) fn end(&mut self, tracer: &Tracer) {
+    pub(in super::super) fn end(&mut self, ear: &Ear) {
         self.repeated();
         let again: u64 = self.objects.values().map(|told| told.again).sum();
         if again > 0 || self.cycles.values().any(|count| count.rhythm.number > 1) {
@@ -95,14 +96,12 @@ impl Story<'_> {
         for (cycle, count) in cycles.iter().filter(|(_, count)| count.rhythm.number > 1) {
             let mut what = cycle.name();
             if let Cycle::Heartbeat(bus, node) = *cycle
-                && let Some(state) = tracer.state(bus, node)
+                && let Some(state) = ear.tracer().state(bus, node)
             {
                 what = format!("{what}, at last {state}");
             }
-            let bus = match self.buses.get(usize::from(cycle.bus())) {
-                Some(name) if self.buses.len() > 1 => format!("{name} "),
-                _ => String::new(),
-            };
+            let name = ear.bus_name(cycle.bus()).filter(|_| ear.has_several_buses());
+            let bus = name.map_or_else(String::new, |name| format!("{name} "));
             let period =
                 count.rhythm.mean().map_or_else(String::new, |mean| format!(", every {:.1} ms", mean / 1e6));
             let changes = match count.changes {

@@ -23,7 +23,6 @@ const LINES: usize = 500;
 struct Watch<'a> {
     story: Story<'a>,
     lines: VecDeque<String>,
-    names: BTreeMap<u16, String>,
     traffic: BTreeMap<u16, Traffic>,
     nodes: BTreeMap<(u16, NodeId), Node>,
     last: Option<i64>,
@@ -67,11 +66,6 @@ impl Teller for Watch<'_> {
         let number = number_of(record);
         let nanos = time.map(|time| time.0);
         self.last = nanos.or(self.last);
-        if let Some(name) = bus
-            && !self.names.contains_key(&number)
-        {
-            self.names.insert(number, name.to_owned());
-        }
         let traffic = self.traffic.entry(number).or_default();
         if record.frame.kind == FrameKind::Error {
             traffic.errors += 1;
@@ -124,7 +118,6 @@ impl<'a> Buses<'a> {
             watch: Watch {
                 story: Story::new(objects, false),
                 lines: VecDeque::new(),
-                names: BTreeMap::new(),
                 traffic: BTreeMap::new(),
                 nodes: BTreeMap::new(),
                 last: None,

@@ -21,11 +21,6 @@ impl Buses<'_> {
         nodes.iter().map(|(&at, node)| (at.0, View::new(node, at, *now, story, ear.tracer())))
     }
 
-    /// The name of a bus, where there is one.
-    fn bus(&self, number: u16) -> Option<&str> {
-        self.watch.names.get(&number).map(String::as_str)
-    }
-
     fn rates(&self, traffic: &Traffic) -> [Rate; 3] {
         let (now, start) = (self.now.unwrap_or(0), self.start.unwrap_or(0));
         [traffic.rate(now, start), traffic.mean(now, start), traffic.peak()]
@@ -72,7 +67,7 @@ impl Buses<'_> {
                 _ => Tone::Warn,
             };
             let cells = [
-                self.bus(number).unwrap_or("-").to_owned(),
+                self.ear.bus_name(number).unwrap_or("-").to_owned(),
                 traffic.state.map_or("-".into(), |state| state.to_string()),
                 traffic.frames().to_string(),
                 format!("{:.1}", now.frames),
@@ -89,18 +84,18 @@ impl Buses<'_> {
     }
 
     fn node_table(&self) -> Table {
-        let several = self.watch.names.len() > 1;
+        let several = self.ear.has_several_buses();
         let columns: Vec<_> = several.then_some("bus").into_iter().chain(View::COLUMNS).collect();
         let mut table = Table::new("Nodes", &columns, "no node has been heard");
         for (bus, view) in self.views() {
-            let bus = several.then(|| self.bus(bus).unwrap_or("-").to_owned());
+            let bus = several.then(|| self.ear.bus_name(bus).unwrap_or("-").to_owned());
             table.push(view.tone(), bus.into_iter().chain(view.cells()));
         }
         table
     }
 
     fn cycle_table(&self) -> Table {
-        let several = self.watch.names.len() > 1;
+        let several = self.ear.has_several_buses();
         let columns = ["what", "count>", "period>", "shortest>", "longest>", "age>", "changes>", "last"];
         let columns: Vec<_> = several.then_some("bus").into_iter().chain(columns).collect();
         let mut table = Table::new("What repeats itself", &columns, "nothing");
@@ -132,7 +127,7 @@ impl Buses<'_> {
                 if cycle.carries() { count.changes.to_string() } else { String::new() },
                 last,
             ];
-            let bus = several.then(|| self.bus(cycle.bus()).unwrap_or("-").to_owned());
+            let bus = several.then(|| self.ear.bus_name(cycle.bus()).unwrap_or("-").to_owned());
             table.push(if gone { Tone::Faint } else { Tone::Plain }, bus.into_iter().chain(cells));
         }
         table
@@ -168,7 +163,7 @@ impl Buses<'_> {
                 })
             });
             json!({
-                "bus": self.bus(number),
+                "bus": self.ear.bus_name(number),
                 "state": traffic.state.map(|state| state.to_string()),
                 "frames": traffic.frames(),
                 "now": now,
@@ -178,7 +173,7 @@ impl Buses<'_> {
                 "overruns": traffic.overruns,
             })
         });
-        let nodes = self.views().map(|(number, view)| with_bus(self.bus(number), view.json()));
+        let nodes = self.views().map(|(number, view)| with_bus(self.ear.bus_name(number), view.json()));
         let repeating = self.watch.story.cycles().iter().map(|(cycle, count)| {
             let rhythm = count.rhythm;
             let values = self.values(*cycle, &count.data).into_iter().map(|(field, node)| {
@@ -203,7 +198,7 @@ impl Buses<'_> {
                 "data": cycle.carries().then(|| hex(&count.data)),
                 "values": values.collect::<Vec<_>>(),
             });
-            with_bus(self.bus(cycle.bus()), document)
+            with_bus(self.ear.bus_name(cycle.bus()), document)
         });
         let by_kind: serde_json::Map<_, _> =
             counted_kinds(&self.totals).map(|(name, count)| (name.into(), count.into())).collect();
