@@ -178,7 +178,35 @@ impl Subject for Replay<'_> {
         if to < self.at {
             self.rewind()?;
         }
-        self.forth(to)?;
+        if to > self.at {
+            // Behind the last frame is the end, where what is open shows.
+            self.forth(if to == total { u64::MAX } else { to })?;
+        }
         Ok(true)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What was still open at the end was told on the first way there alone.
+    #[test]
+    fn the_end_is_the_same_however_it_is_reached() {
+        let mut file = tempfile::NamedTempFile::new().unwrap();
+        let log = "(1.0) can0 601#4000100000000000\n(2.0) can0 701#05\nend\n";
+        std::io::Write::write_all(&mut file, log.as_bytes()).unwrap();
+        let reading =
+            Reading { eds: Vec::new(), linmot: Vec::new(), can_link: false, format: None, times: None };
+        let names = Names::default();
+        let mut replay = open(file.path().to_str().unwrap(), &reading, &names, None).unwrap();
+        let end = replay.document();
+        assert!(end["story"].to_string().contains("NO ANSWER") && end["damaged"] == 1, "{end}");
+        for way in [[Step::Start, Step::End], [Step::Back, Step::Forth], [Step::FarBack, Step::FarForth]] {
+            for step in way {
+                replay.go(step).unwrap();
+            }
+            assert_eq!(replay.document(), end, "{way:?}");
+        }
     }
 }
