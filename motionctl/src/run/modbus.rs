@@ -141,8 +141,9 @@ fn accept(listener: &TcpListener, unit: u8, images: &Arc<Mutex<Images>>, stop: &
         });
         clients.push(Client { thread, stop: own, heard });
     }
+    // All at once: each may take its time.
+    clients.iter().for_each(|client| client.stop.store(true, Ordering::Relaxed));
     for client in clients {
-        client.stop.store(true, Ordering::Relaxed);
         let _ = client.thread.join();
     }
 }
