@@ -22,8 +22,9 @@ pub(crate) enum ChoiceOf {
     Can,
 }
 
-/// What the command line, the environment or the configuration names, as an endpoint's text.
-pub(crate) fn choose(global: &Global, given: Option<&str>, what: ChoiceOf) -> Result<String, Exit> {
+/// What the command line, the environment or the configuration names, as an endpoint's text; none, if nothing
+/// is named.
+pub(crate) fn named(global: &Global, given: Option<&str>, what: ChoiceOf) -> Result<Option<String>, Exit> {
     let config = match &global.config {
         Some(path) => {
             let name = path.display().to_string();
@@ -32,18 +33,25 @@ pub(crate) fn choose(global: &Global, given: Option<&str>, what: ChoiceOf) -> Re
         }
         None => toml_edit::DocumentMut::new(),
     };
-    let (key, missing) = match what {
-        ChoiceOf::Port => {
-            ("port", "no port: --port EP, MOTIONCTL_PORT or `port` in the configuration file expected")
-        }
-        ChoiceOf::Can => {
-            ("can", "no CAN endpoint: --can EP, MOTIONCTL_CAN or `can` in the configuration file expected")
-        }
+    let key = match what {
+        ChoiceOf::Port => "port",
+        ChoiceOf::Can => "can",
     };
     let default = config.get(key).and_then(|item| item.as_str());
-    let written = given.or(default).ok_or_else(|| Exit::usage(missing))?;
+    let Some(written) = given.or(default) else { return Ok(None) };
     let named = config.get("endpoints").and_then(|table| table.get(written)).and_then(|item| item.as_str());
-    Ok(named.unwrap_or(written).to_owned())
+    Ok(Some(named.unwrap_or(written).to_owned()))
+}
+
+/// The same where something must be named.
+pub(crate) fn choose(global: &Global, given: Option<&str>, what: ChoiceOf) -> Result<String, Exit> {
+    let missing = match what {
+        ChoiceOf::Port => "no port: --port EP, MOTIONCTL_PORT or `port` in the configuration file expected",
+        ChoiceOf::Can => {
+            "no CAN endpoint: --can EP, MOTIONCTL_CAN or `can` in the configuration file expected"
+        }
+    };
+    named(global, given, what)?.ok_or_else(|| Exit::usage(missing))
 }
 
 /// The serial endpoint that `--port`, the environment or the configuration names.

@@ -408,6 +408,12 @@ fn frames_as_they_come() {
     }
 }
 
+/// It was "nothing to show".
+#[test]
+fn a_configuration_file_that_is_not_there_is_told() {
+    Bench::new().run(&["monitor", "--once", "--config", "NO.toml"]).ends(5).says("NO.toml");
+}
+
 #[test]
 fn wrong_usage() {
     let bench = Bench::new();

@@ -5,7 +5,7 @@ use motion_io::endpoint::{CanEndpoint, EndpointError};
 
 use crate::can::cli::Stream;
 use crate::cli::{Global, Line};
-use crate::connect::{ChoiceOf, choose};
+use crate::connect::{ChoiceOf, choose, named};
 use crate::decode::cli::Reading;
 use crate::exit::Exit;
 
@@ -60,10 +60,11 @@ impl Monitor {
             (None, None) => {
                 // Of a controller alone there are these.
                 let asks = self.device.is_some() || !self.param.is_empty() || !self.ram.is_empty();
-                let named =
-                    |given: Option<String>, what| choose(global, given.as_deref(), what).ok().map(|_| given);
-                let can = named(of("MOTIONCTL_CAN"), ChoiceOf::Can).filter(|_| !asks);
-                let port = named(of("MOTIONCTL_PORT"), ChoiceOf::Port).filter(|_| self.bitrate.is_none());
+                let named = |given: Option<String>, what| -> Result<_, Exit> {
+                    Ok(named(global, given.as_deref(), what)?.map(|_| given))
+                };
+                let can = named(of("MOTIONCTL_CAN"), ChoiceOf::Can)?.filter(|_| !asks);
+                let port = named(of("MOTIONCTL_PORT"), ChoiceOf::Port)?.filter(|_| self.bitrate.is_none());
                 match (can, port) {
                     (Some(can), None) => (Some(can), None),
                     (None, Some(port)) => (None, Some(port)),
