@@ -6,7 +6,7 @@
 mod show;
 
 use core::time::Duration;
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use canopen_master::data_type::DataType;
 use lb2::code::StoredFailure;
@@ -93,6 +93,8 @@ pub(super) struct Controller {
     silent: Option<Duration>,
     rounds: u64,
     lines: VecDeque<String>,
+    /// Refusals and remarks among them, also of lines that are no longer kept.
+    told: BTreeSet<String>,
 }
 
 impl Controller {
@@ -108,6 +110,7 @@ impl Controller {
             silent: None,
             rounds: 0,
             lines: VecDeque::new(),
+            told: BTreeSet::new(),
         }
     }
 
@@ -157,8 +160,9 @@ impl Controller {
             }
             Heard::Refused(what) | Heard::Remark(what) => {
                 // Asked for again and again, told once.
-                if self.lines.iter().rev().take(20).all(|line| !line.ends_with(&what)) {
+                if !self.told.contains(&what) {
                     self.tell(&what);
+                    self.told.insert(what);
                 }
             }
             Heard::Silence(what) => {
@@ -256,6 +260,16 @@ mod tests {
         assert_eq!(controller.rounds(), 1);
         let text = controller.sheet().text();
         assert!(text.contains("speed") && text.contains("-2"), "{text}");
+    }
+
+    /// Each of more than 20 refusals was told anew in every round.
+    #[test]
+    fn a_refusal_is_told_once_in_all() {
+        let mut controller = Controller::new("COM".into(), Vec::new(), Vec::new());
+        for number in (0..30).cycle().take(90) {
+            controller.hear(Heard::Refused(format!("parameter [{number:03}]: refused")));
+        }
+        assert_eq!(controller.lines.len(), 30);
     }
 
     #[test]
