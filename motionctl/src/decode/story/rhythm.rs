@@ -49,7 +49,7 @@ impl Rhythm {
                 self.period = Some(gap);
                 return;
             }
-            Some((_, missing)) => self.missed += missing,
+            Some((_, missing)) => self.missed = self.missed.saturating_add(missing),
             None => {}
         }
         if period > 0 && gap.saturating_mul(10) > period.saturating_mul(GAP) {
@@ -101,6 +101,13 @@ mod tests {
         let faster = heard((0..4).map(|n| n * 1000).chain((0..50).map(|n| 3100 + n * 100)));
         assert_eq!(faster.missed, 0);
         assert!(faster.period.unwrap() < 110, "{faster:?}");
+    }
+
+    /// Gaps of all of time, again and again.
+    #[test]
+    fn what_is_missing_is_counted_without_overflow() {
+        let round = [0, 1, i64::MAX, i64::MIN, i64::MIN + 1];
+        assert_eq!(heard(round.into_iter().cycle().take(30)).missed, u64::MAX);
     }
 
     #[test]
