@@ -132,17 +132,22 @@ impl SdoLink {
     fn wait(&mut self, command: Command) -> Result<(), LinkError> {
         let end = self.port.now().saturating_add(BUSY);
         loop {
-            match self.exchange(&Access::flash_state())? {
+            let answer = self.exchange(&Access::flash_state())?;
+            match answer {
+                // What it was doing ended with its power.
+                _ if self.booted => return Err(LinkError::Restarted { command }),
                 Some(answer) if sdo::Client::is_flash_busy(answer) => {}
                 Some(_) => return Ok(()),
-                None => return Err(silence(command, self.booted)),
+                None => return Err(LinkError::NoAnswer { command }),
             }
             let again = self.port.now().saturating_add(PAUSE);
             if again > end {
                 return Err(LinkError::StillBusy { command });
             }
             while self.port.now() < again {
-                self.port.receive(again.saturating_sub(self.port.now()))?;
+                if let Some(Event::Frame(frame)) = self.port.receive(again.saturating_sub(self.port.now()))? {
+                    self.booted |= is_boot_up(&frame, self.node);
+                }
             }
         }
     }

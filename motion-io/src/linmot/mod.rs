@@ -58,7 +58,7 @@ pub enum LinkError {
         found: String,
     },
     /// The drive says "busy" for longer than anything takes.
-    #[error("the drive is still busy with {command}")]
+    #[error("the drive is still busy with {command}{}", unknown(*.command))]
     StillBusy {
         /// What was asked.
         command: Command,

@@ -52,6 +52,8 @@ pub(crate) struct World {
     pub(crate) twice: bool,
     /// Answers are altered.
     pub(crate) falsified: bool,
+    /// The drive's power fails for a moment then.
+    pub(crate) power_fails: Option<Duration>,
 }
 
 impl World {
@@ -64,6 +66,15 @@ impl World {
 
     pub(crate) fn wait(&mut self, time: Duration) {
         self.now += time;
+        if self.power_fails.take_if(|at| *at <= self.now).is_some() {
+            match &mut self.station {
+                Station::Can(node) => node.power_cycle(self.now),
+                Station::LinRs { slave, drive } => {
+                    *slave = Slave::new(1, Checksum::None);
+                    drive.power_cycle(self.now);
+                }
+            }
+        }
         match &mut self.station {
             Station::Can(node) => node.handle_timeout(self.now),
             Station::LinRs { slave, drive } => slave.handle_timeout(self.now, drive),
@@ -79,6 +90,7 @@ impl World {
                 Station::Can(node) => node.poll_timeout(),
                 Station::LinRs { slave, drive } => slave.poll_timeout(drive),
             };
+            let next = next.into_iter().chain(self.power_fails).min();
             let next = next.unwrap_or(end).clamp(self.now + Duration::from_micros(1), end);
             self.wait(next - self.now);
         }
@@ -204,8 +216,16 @@ impl Bench {
             _ => Station::Can(CanDrive::new(drive, Some(node), 1)),
         };
         let (frames, bytes) = (VecDeque::new(), VecDeque::new());
-        let mut world =
-            World { station, now: Duration::ZERO, frames, bytes, lost: 0, twice: false, falsified: false };
+        let mut world = World {
+            station,
+            now: Duration::ZERO,
+            frames,
+            bytes,
+            lost: 0,
+            twice: false,
+            falsified: false,
+            power_fails: None,
+        };
         // The drive has booted.
         world.wait(Duration::from_millis(1));
         let world = Arc::new(Mutex::new(world));

@@ -132,7 +132,37 @@ fn a_busy_drive_is_asked_again() {
                     "{carrier:?}: {error}"
                 );
                 assert!(waited < Duration::from_secs(31), "{carrier:?}: {waited:?}");
+                let write = Request::Write { memory: Memory::Rom, upid: Upid(0x13A2), value: 11 };
+                let error = bench.link.ask(write).unwrap_err().to_string();
+                assert!(error.contains("it may have been carried out all the same"), "{carrier:?}: {error}");
             }
+        }
+    }
+}
+
+/// A command that was under way when the drive lost its power is not called done because the drive, which
+/// has started anew, is not busy any more.
+#[test]
+fn a_restart_while_flash_is_written_is_named() {
+    for (carrier, words) in [
+        (Carrier::Sdo, "restarted during"),
+        (Carrier::Pdo, "restarted during"),
+        (Carrier::LinRs, "no answer to"),
+    ] {
+        for after in [5, 30, 100, 250] {
+            let mut bench = Bench::new(carrier);
+            add(&mut bench.link, &[0, 7]);
+            bench.link.ask(Request::Stop).unwrap();
+            {
+                let mut world = bench.world();
+                let times = Times { restart: Duration::from_millis(3), ..TIMES };
+                world.drive().set_times(times);
+                world.power_fails = Some(world.now + Duration::from_millis(after));
+            }
+            let error =
+                bench.link.ask(Request::SaveCurves).expect_err(&format!("{carrier:?} {after}")).to_string();
+            assert!(error.contains(words), "{carrier:?} {after}: {error}");
+            assert!(error.contains("may have been carried out"), "{carrier:?} {after}: {error}");
         }
     }
 }
