@@ -127,7 +127,7 @@ fn parameters(tester: &mut Tester<'_>) -> Checked {
     none_of(&faults)
 }
 
-/// What was read; that it cannot be is one fault more.
+/// What was read; that it cannot be is one fault more. What was found before stands, whatever follows.
 fn faults_but<T>(read: Checked<T>, faults: &mut Vec<String>) -> Checked<Option<T>> {
     match read {
         Ok(read) => Ok(Some(read)),
@@ -135,6 +135,7 @@ fn faults_but<T>(read: Checked<T>, faults: &mut Vec<String>) -> Checked<Option<T
             faults.push(why);
             Ok(None)
         }
+        Err(Problem::Skip(_)) if !faults.is_empty() => Ok(None),
         Err(other) => Err(other),
     }
 }

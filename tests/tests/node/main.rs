@@ -12,7 +12,7 @@ use pdo::Frame;
 
 mod wrong;
 
-use wrong::{WRONG, Wrong, no_toggle, recoded};
+use wrong::{WRONG, Wrong, answers, no_toggle, recoded};
 
 const NODE: u8 = 5;
 
@@ -248,6 +248,22 @@ fn a_node_that_does_not_toggle_fails_under_that_clause_only() {
             "{case:?}"
         );
     }
+}
+
+/// A node without toggle bit, and without an answer to what needs no segments.
+#[test]
+fn wrong_segments_do_not_excuse_silence() {
+    let node = RemoteIo::node(Some(id()), 1, true);
+    let device = device_file(&node, "Virtual I/O");
+    let mut bench = Bench::new(node, |heard: &[Frame], frame: Option<Frame>| {
+        let silent = |frame: &Frame| answers(heard, frame, &[0x40, 0x01, 0x64, 1]);
+        frame.into_iter().filter(|frame| !silent(frame)).flat_map(|frame| no_toggle(heard, frame)).collect()
+    });
+    let cases = test(&mut bench, &config(&device, true), |_| {}).unwrap();
+    let failed = failed(&cases);
+    assert!(failed.iter().any(|(id, _)| *id == "sdo.segmented-upload"), "{failed:?}");
+    let (_, why) = failed.iter().find(|(id, _)| *id == "object.6401.01.read").unwrap();
+    assert!(why.contains("6401h:01 cannot be read"), "{why}");
 }
 
 /// Only the first one was told.

@@ -36,7 +36,7 @@ fn with(frame: &Frame, change: impl FnOnce(&mut [u8])) -> Vec<Frame> {
 }
 
 /// An SDO answer whose last request begins with these bytes.
-fn answers(heard: &[Frame], frame: &Frame, request: &[u8]) -> bool {
+pub(super) fn answers(heard: &[Frame], frame: &Frame, request: &[u8]) -> bool {
     is(frame, 0x580) && heard.last().is_some_and(|last| is(last, 0x600) && last.data().starts_with(request))
 }
 
