@@ -39,7 +39,7 @@ impl Gear {
     fn begin(&mut self, inputs: &[ActualValue; 6], time: f64) {
         let master = self.master(inputs);
         let way = libm::round(f64::from(master.velocity) * time) as i32;
-        (self.last, self.rest) = (master.position.wrapping_sub(way), 0);
+        (self.last, self.rest) = (master.position.wrapping_sub(master.shift).wrapping_sub(way), 0);
         self.velocity = self.velocity_now(inputs, time);
     }
 

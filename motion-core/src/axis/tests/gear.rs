@@ -32,6 +32,16 @@ fn moved(rig: &mut Rig, way: i32) -> AxisStatus {
     status
 }
 
+/// A cycle in which the master's scale moves, and the master does not.
+fn shifted(rig: &mut Rig, shift: i32) -> AxisStatus {
+    let master = &mut rig.inputs[2];
+    (master.position, master.velocity) = (master.position.wrapping_add(shift), 0);
+    master.shift = shift;
+    let status = rig.cycle().status;
+    rig.inputs[2].shift = 0;
+    status
+}
+
 fn order(rig: &mut Rig, order: Order, way: i32) -> AxisStatus {
     rig.input.order = Some(order);
     moved(rig, way)
@@ -144,6 +154,25 @@ fn a_calibrated_master_moves_nothing() {
     moved(&mut rig, -40_000 + 5);
     assert_eq!(moved(&mut rig, 0).nominal_position, at + 10);
     assert!(rig.failures.is_empty());
+}
+
+/// In the cycle of the order too, and in those in which the brake opens.
+#[test]
+fn a_master_calibrated_as_gearing_begins_moves_nothing() {
+    let mut rig = with(&[]);
+    let before = rig.output.status.nominal_position;
+    rig.input.order = Some(gear(1, 1));
+    let status = shifted(&mut rig, -40_000);
+    assert!(status.in_velocity, "{status:?}");
+    assert_eq!(moved(&mut rig, 0).nominal_position, before);
+
+    let mut rig = with(&[(744, 1), (732, 0)]);
+    let before = order(&mut rig, gear(1, 1), 0).nominal_position;
+    for _ in 0..20 {
+        shifted(&mut rig, 700);
+    }
+    assert_eq!((moved(&mut rig, 0).nominal_position, rig.failures.len()), (before, 0));
+    assert!(rig.output.status.in_velocity);
 }
 
 #[test]
