@@ -85,8 +85,7 @@ impl Axis {
         (master, numerator, denominator): (u8, i32, u32),
         inputs: &[ActualValue; 6],
     ) -> Result<(), MotionError> {
-        let limits = self.settings.limits.filter(|_| self.settings.mode == Mode::Control);
-        let limits = limits.ok_or(MotionError::NOT_CONFIGURED)?;
+        let limits = self.gear_limits().ok_or(MotionError::NOT_CONFIGURED)?;
         let itself = self.settings.input == Some(master);
         if !(1..=6).contains(&master) || itself || numerator == 0 || denominator == 0 {
             return Err(MotionError::RANGE);
@@ -106,6 +105,11 @@ impl Axis {
         self.engage(&gear, limits);
         self.start(Motion::Gear(gear), true);
         Ok(())
+    }
+
+    /// Within which it gets in gear and out; `None` where it cannot be geared.
+    pub(super) fn gear_limits(&self) -> Option<Limits> {
+        self.settings.limits.filter(|_| self.settings.mode == Mode::Control)
     }
 
     /// Length of a cycle, s.

@@ -127,8 +127,12 @@ impl Default for Axis {
 
 impl AxisControl for Axis {
     fn configure(&mut self, values: &Values, at: usize, cycle: u16) {
-        self.settings = Settings::read(values, at);
+        let before = core::mem::replace(&mut self.settings, Settings::read(values, at));
         self.cycle = cycle;
+        if matches!(self.motion, Motion::Gear(_)) && self.gear_limits().is_none() {
+            self.brake_within(self.settings.limits.or(before.limits));
+            self.motion = Motion::Braking { stop: false };
+        }
         // A motion goes on within the new limits; only a velocity that is above them cannot.
         let Some(limits) = self.settings.limits else { return };
         // Refused limits cannot come from parameters in range; the old ones would go on.
@@ -143,10 +147,6 @@ impl AxisControl for Axis {
                     let most = limits.velocity();
                     _ = self.generator.go(Goal::Velocity(velocity.clamp(-most, most)), limits);
                 }
-            }
-            Motion::Gear(_) if self.settings.mode != Mode::Control => {
-                self.brake_softly();
-                self.motion = Motion::Braking { stop: false };
             }
             _ => {}
         }

@@ -216,7 +216,8 @@ impl Axis {
         self.brake_within(self.settings.limits);
     }
 
-    fn brake_within(&mut self, limits: Option<crate::trajectory::Limits>) {
+    /// Stops within these limits; at once where there are none.
+    pub(super) fn brake_within(&mut self, limits: Option<crate::trajectory::Limits>) {
         self.disengage();
         let stopped = limits.is_some_and(|limits| self.generator.go(Goal::Velocity(0.0), limits).is_ok());
         if !stopped {

@@ -334,6 +334,31 @@ fn what_cannot_be_geared_is_refused() {
     assert_eq!((rig.output.status.state, rig.output.command.velocity), (State::Standstill, 0.0));
 }
 
+/// Parameters with which gearing could not begin end it, within the limits that the axis had.
+#[test]
+fn gearing_ends_with_the_parameters_it_needs() {
+    for changes in [&[(654, 0), (600, 3)][..], &[(654, 0), (600, 2)], &[(654, 0)]] {
+        let mut rig = with(&[]);
+        order(&mut rig, gear(1, 1), 5);
+        for _ in 0..1_000 {
+            moved(&mut rig, 5);
+        }
+        for &(index, value) in changes {
+            rig.values.set(index, value).unwrap();
+        }
+        rig.axis.configure(&rig.values, 0, 1);
+        let mut last = rig.output.status.nominal_velocity;
+        for _ in 0..1_000 {
+            let velocity = moved(&mut rig, 5).nominal_velocity;
+            assert!((velocity - last).abs() <= 20.0 + 1e-6 || changes.contains(&(600, 2)), "{velocity}");
+            last = velocity;
+        }
+        assert_eq!((rig.output.status.state, last), (State::Standstill, 0.0), "{changes:?}");
+        order(&mut rig, Order::GearOut, 5);
+        assert_eq!(rig.last_end(), Some(Progress::Failed(MotionError::NOT_GEARED)));
+    }
+}
+
 /// The largest ratio and way there are: nothing overflows.
 #[test]
 fn extreme_ratios() {
