@@ -194,8 +194,9 @@ fn an_axis_does_not_follow_a_broken_encoder() {
 /// SetPosition on the master moves its scale, and the slave not at all.
 #[test]
 fn a_position_set_on_the_master_moves_no_slave() {
-    for quantity in [0, 2] {
-        let (mut bench, _) = geared_axis(quantity, &[]);
+    let virtual_axis = [(606, 8)];
+    for (quantity, master) in [(0, &[][..]), (2, &[]), (2, &virtual_axis)] {
+        let (mut bench, _) = geared_axis(quantity, master);
         bench.order(Order::MoveAbsolute { position: 3_500, velocity: None });
         bench.run(3_000);
         let before = bench.machine.axes[1].plant.position();
@@ -209,4 +210,22 @@ fn a_position_set_on_the_master_moves_no_slave() {
         assert!((moved + 300.0).abs() <= 1.0, "{moved}");
         assert_eq!(bench.controller.failure_count(), 0);
     }
+}
+
+/// Nor where the reading of that very cycle is one that input 3 suppresses, `[184]`.
+#[test]
+fn a_position_set_on_a_master_that_jumps_moves_no_slave() {
+    let (mut bench, _) = geared_axis(0, &[(184 + GEAR as u16, 100), (191 + GEAR as u16, 1)]);
+    bench.controller.axis(MASTER.axis).unwrap().set_power(false).unwrap();
+    bench.run(12);
+    bench.controller.axis(MASTER.axis).unwrap().set_position(-90_000).unwrap();
+    let before = slave(&bench);
+    bench.cycle();
+    bench.inputs.encoders[0].count += 1_000;
+    for reading in [Reading::Extrapolated, Reading::Real, Reading::Real] {
+        bench.cycle();
+        assert_eq!(bench.controller.actual_values()[GEAR].reading, reading);
+        assert_eq!(slave(&bench), before);
+    }
+    assert_eq!(bench.controller.failure_count(), 0);
 }

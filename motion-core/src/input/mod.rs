@@ -196,15 +196,16 @@ impl ActualValueInput {
             self.settled = false;
             return self.value;
         }
-        let previous = self.value.position;
-        let count = self.count;
         let edge = self.signal(sources);
+        self.move_with_source(sources);
         self.value = ActualValue {
             shift: core::mem::take(&mut self.moved),
             calibrated: false,
             failure: None,
             ..self.value
         };
+        let previous = self.value.position;
+        let count = self.count;
         let reading = self.read(sources);
         if matches!(reading, Reading::None | Reading::Lost) {
             if self.lost || !self.compensate(sources.cycle) {
@@ -219,12 +220,7 @@ impl ActualValueInput {
             return self.value;
         }
         let position = self.scaled(self.count);
-        // What moved the scale of the source moves the one here, and is no movement.
-        let moved = self.source_shift(sources);
-        let shift = position.wrapping_sub(self.scaled(self.count.wrapping_sub(moved)));
-        let previous = previous.wrapping_add(shift);
         let step = position.wrapping_sub(previous);
-        self.value.shift = self.value.shift.wrapping_add(shift);
         if !self.settled {
             // The first reading: where the axis is, not a movement.
             self.value.shift = self.value.shift.wrapping_add(step);
@@ -238,7 +234,7 @@ impl ActualValueInput {
                 let rate = delta.saturating_mul(1000) / i64::from(sources.cycle.max(1));
                 rate.clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32
             };
-            self.value.frequency = per_second(self.count.wrapping_sub(count).wrapping_sub(moved));
+            self.value.frequency = per_second(self.count.wrapping_sub(count));
             self.value.velocity = per_second(i64::from(step));
         }
         self.value.position = position;
@@ -296,15 +292,22 @@ impl ActualValueInput {
         }
     }
 
-    /// How far the scale of what this input takes over moved in this cycle, counts.
-    fn source_shift(&self, sources: &Sources<'_>) -> i64 {
-        let Kind::Virtual2 { quantity, source } = self.settings.kind else { return 0 };
+    /// What moved the scale of what this input takes over moves the one here, and is no movement, whatever
+    /// becomes of this cycle's reading.
+    fn move_with_source(&mut self, sources: &Sources<'_>) {
+        let Kind::Virtual2 { quantity, source } = self.settings.kind else { return };
         let shift = match quantity {
             Quantity::ActualValue => sources.inputs.get(source).map(|input| input.shift),
             Quantity::Position => sources.axes.get(source).map(|axis| axis.shift),
             Quantity::Frequency | Quantity::Velocity | Quantity::Steps => None,
         };
-        shift.unwrap_or(0).into()
+        if let (Some(shift), Some(last)) = (shift, &mut self.last) {
+            *last = last.wrapping_add(shift as u32);
+            let before = self.scaled(self.count);
+            self.count = self.count.wrapping_add(shift.into());
+            let moved = self.scaled(self.count).wrapping_sub(before);
+            self.move_to(self.value.position.wrapping_add(moved));
+        }
     }
 
     /// Takes the reading of this cycle into `count`, if there is one.

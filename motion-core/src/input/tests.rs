@@ -239,6 +239,36 @@ fn virtual2_moves_its_scale_with_the_source() {
     }
 }
 
+/// A source that is calibrated in a cycle that is compensated, or while it is lost: the scale here moves
+/// with it all the same, once.
+#[test]
+fn virtual2_moves_its_scale_while_it_compensates() {
+    let changes = [(100, 4), (163, 3), (205, 2), (212, 1), (184, 100), (191, 1)];
+    let seen = |rig: &mut Rig, position, shift, reading| {
+        rig.inputs[2] = ActualValue { position, shift, reading, ..ActualValue::default() };
+        let value = rig.cycle();
+        (value.position, value.shift, value.reading, value.failure)
+    };
+    let (real, extrapolated, lost) = (Reading::Real, Reading::Extrapolated, Reading::Lost);
+
+    // A jump of 1,000 and back, and 5,000 that are none.
+    let mut jumps = rig(0, &changes);
+    seen(&mut jumps, 0, 0, real);
+    assert_eq!(seen(&mut jumps, 10, 0, real), (20, 0, real, None));
+    assert_eq!(seen(&mut jumps, 6_020, 5_000, real), (10_040, 10_000, extrapolated, None));
+    assert_eq!(seen(&mut jumps, 5_030, 0, real), (10_060, 0, real, None));
+
+    let mut lossy = rig(0, &changes);
+    seen(&mut lossy, 0, 0, real);
+    assert_eq!(seen(&mut lossy, 10, 0, real), (20, 0, real, None));
+    assert_eq!(seen(&mut lossy, 5_010, 5_000, lost), (10_040, 10_000, extrapolated, None));
+    assert_eq!(seen(&mut lossy, 5_030, 0, real), (10_060, 0, real, None));
+    assert_eq!(seen(&mut lossy, 5_030, 0, lost).2, extrapolated);
+    assert_eq!(seen(&mut lossy, 5_030, 0, lost).2, lost);
+    assert_eq!(seen(&mut lossy, 5_130, 100, lost).1, 200);
+    assert_eq!(seen(&mut lossy, 5_150, 0, real), (10_300, 0, real, None));
+}
+
 /// `[170]`: 1234 counts a second, exact over any number of cycles, both ways.
 #[test]
 fn parameter_170_is_the_counter_frequency() {
