@@ -48,18 +48,22 @@ impl Errors {
         if self.active.contains(&(code, cause)) {
             return Ok(());
         }
-        let mut slots = self.active.iter_mut();
-        let room = slots.find(|(code, _)| *code == ErrorCode::NO_ERROR).ok_or(ProducerFull(EMERGENCIES))?;
-        *room = (code, cause);
-        let register = self.register();
-        self.producer.push(Emergency { code, register, data })
+        // One without room is told all the same, as if it were over.
+        if let Some(room) = self.active.iter_mut().find(|(code, _)| *code == ErrorCode::NO_ERROR) {
+            *room = (code, cause);
+        }
+        self.send(code, data)
     }
 
     /// An error that is over as soon as it is told, such as a PDO that was too long.
     pub(super) fn mention(&mut self, code: ErrorCode, data: [u8; 5]) {
-        let register = self.register() | code.register_bit();
         // The history has it, even where too many wait.
-        let _ = self.producer.push(Emergency { code, register, data });
+        let _ = self.send(code, data);
+    }
+
+    fn send(&mut self, code: ErrorCode, data: [u8; 5]) -> Result<(), ProducerFull> {
+        let register = self.register() | code.register_bit();
+        self.producer.push(Emergency { code, register, data })
     }
 
     /// Errors are gone; `told`: and it is told.
@@ -110,5 +114,19 @@ mod tests {
             [(ErrorCode::TEMPERATURE, 0x09), (ErrorCode::LIFE_GUARD, 0x19), (ErrorCode::NO_ERROR, 0x11)];
         assert_eq!(sent, expected);
         assert_eq!(errors.producer().history().len(), 2);
+    }
+
+    #[test]
+    fn an_error_too_many_is_sent_and_recorded() {
+        let mut errors = Errors::new();
+        for code in 0x1000..0x1008 {
+            errors.raise(ErrorCode(code), DEVICE, [0; 5]).unwrap();
+            errors.producer().poll_transmit(Duration::ZERO).unwrap();
+        }
+        errors.raise(ErrorCode::TEMPERATURE, DEVICE, [0; 5]).unwrap();
+        let sent = errors.producer().poll_transmit(Duration::ZERO).unwrap();
+        assert_eq!((sent.code, sent.register), (ErrorCode::TEMPERATURE, 0x09));
+        assert_eq!(errors.history().first(), Some(&0x4000));
+        assert_eq!(errors.register(), 0x01, "it is not held");
     }
 }

@@ -201,7 +201,8 @@ impl<D: Objects> Slave<D> {
     }
 
     /// An error has occurred: sends an emergency and sets the error register's bits until
-    /// [`clear`](Self::clear). An error that is there already is not told again.
+    /// [`clear`](Self::clear). An error that is there already is not told again. Where [`EMERGENCIES`] others
+    /// are there, it is only told, as [`mention`](Self::mention) does.
     ///
     /// # Errors
     /// [`emcy::ProducerFull`]: too many emergencies wait; the history has it all the same.
