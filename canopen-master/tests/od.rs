@@ -184,6 +184,26 @@ fn size_not_indicated() {
     assert_eq!(device.objects.dictionary.get::<i16>(Address::new(0x2000, 0)), Ok(5));
 }
 
+/// Only expedited data may be longer than the type: of segments, every byte counts.
+#[test]
+fn segments_without_indicated_size_are_not_cut() {
+    let mut memory = [0; TABLE.memory()];
+    let mut device = Device::new(&mut memory);
+    // 3 bytes, and 4 as in an expedited download.
+    for segment in [[0x09, 5, 0, 1, 0, 0, 0, 0], [0x07, 5, 0, 1, 2, 0, 0, 0]] {
+        for (request, expected) in [
+            ([0x20, 0x00, 0x20, 0, 0, 0, 0, 0], [0x60, 0x00, 0x20, 0, 0, 0, 0, 0]),
+            (segment, [0x80, 0x00, 0x20, 0, 0x12, 0, 7, 6]),
+        ] {
+            let request = Frame::standard(0x601, request);
+            device.server.handle_frame(Duration::ZERO, &request, &mut device.objects);
+            let answer = device.server.poll_transmit(Duration::ZERO, &mut device.objects);
+            assert_eq!(answer, Some(Frame::standard(0x581, expected)));
+        }
+    }
+    assert_eq!(device.objects.dictionary.get::<i16>(Address::new(0x2000, 0)), Ok(-7));
+}
+
 /// CiA 301, 7.5.2.13 and 7.5.2.14.
 #[test]
 fn store_and_restore() {

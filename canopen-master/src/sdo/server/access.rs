@@ -14,8 +14,8 @@ pub struct Piece<'a> {
     pub data: &'a [u8],
     /// The object is complete with this piece (of a block transfer: and its CRC is right).
     pub last: bool,
-    /// Bytes in all, if the client indicated it. An expedited download without indicated size brings
-    /// 4 bytes, of which those count that the object has.
+    /// Bytes in all: with the last piece, or if the client indicated it. An expedited download without
+    /// indicated size has none: it brings 4 bytes, of which those count that the object has.
     pub size: Option<u32>,
 }
 

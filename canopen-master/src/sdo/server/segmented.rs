@@ -193,6 +193,8 @@ impl Server {
         let offset = self.offset;
         // More than 4 GiB have no size that the protocol could indicate.
         self.offset = offset.checked_add(data.len() as u32).ok_or(AbortCode::OUT_OF_MEMORY)?;
-        objects.write(self.at, &Piece { offset, data, last, size: self.size })
+        // With the last piece, the size is known; only an expedited download leaves it open.
+        let size = if last { Some(self.offset) } else { self.size };
+        objects.write(self.at, &Piece { offset, data, last, size })
     }
 }
