@@ -4,7 +4,7 @@ use core::time::Duration;
 
 use pdo::{CobId, NodeId, cob};
 
-use super::errors::DEVICE;
+use super::errors::Cause;
 use super::objects::{View, number};
 use super::{CONSUMERS, Event, Objects, Slave};
 use crate::heartbeat::{Consumer, Producer};
@@ -30,7 +30,7 @@ impl<D: Objects> Slave<D> {
         self.answers = Ring::new();
         self.reset_server(Channel::default_of(node));
         // Nothing is told: the boot-up message says more.
-        let _ = self.errors.clear(|_, cause| cause != DEVICE, false);
+        let _ = self.errors.clear(|_, cause| cause != Cause::Device, false);
         self.guard = guarding::Slave::new(node, None);
         self.producer = Producer::new(node, 0, now);
         self.consumers = [None; CONSUMERS];
@@ -74,6 +74,9 @@ impl<D: Objects> Slave<D> {
                 let life_time_factor = number(0, 0x100D, 0) as u8;
                 let on = period_ms != 0 && life_time_factor != 0;
                 self.guard.set_config(on.then_some(guarding::Config { period_ms, life_time_factor }));
+                if !on {
+                    self.errors.clear_cause(Cause::Guarding);
+                }
             }
             0x1014 => {
                 let default = cob::EMCY + u16::from(self.nmt.node().raw());
@@ -85,8 +88,8 @@ impl<D: Objects> Slave<D> {
                 self.errors.producer().set_inhibit(inhibit);
             }
             0x1016 => {
-                for (sub, slot) in (1..).zip(&mut self.consumers) {
-                    let entry = number(sub, 0x1016, 0) & 0xFF_FFFF;
+                for (index, slot) in self.consumers.iter_mut().enumerate() {
+                    let entry = number(index as u8 + 1, 0x1016, 0) & 0xFF_FFFF;
                     // An entry that has not changed goes on watching.
                     let held = |(node, consumer): &(NodeId, Consumer)| {
                         u32::from(node.raw()) << 16 | u32::from(consumer.time_ms())
@@ -95,6 +98,7 @@ impl<D: Objects> Slave<D> {
                         let time_ms = entry as u16;
                         let node = NodeId::new((entry >> 16) as u8).ok().filter(|_| time_ms != 0);
                         *slot = node.map(|node| (node, Consumer::new(time_ms)));
+                        self.errors.clear_cause(Cause::Heartbeat(index));
                     }
                 }
             }

@@ -7,13 +7,18 @@ use crate::emcy::{Emergency, ErrorCode, Producer, ProducerFull};
 /// Errors that can be there at once, emergencies that can wait, entries of the history (1003h).
 pub const EMERGENCIES: usize = 8;
 
-/// What an error comes from: an object of the communication area that stands for it, or [`DEVICE`].
-pub(super) type Cause = u16;
-
-/// The device itself, or its CAN controller.
-pub(super) const DEVICE: Cause = 0;
-/// Guarding and heartbeats.
-pub(super) const ERROR_CONTROL: Cause = 0x1029;
+/// What an error comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Cause {
+    /// The device itself, or its CAN controller.
+    Device,
+    /// The master's guarding.
+    Guarding,
+    /// A heartbeat that is watched: entry of 1016h, from 0.
+    Heartbeat(usize),
+    /// An RPDO, from 0.
+    Rpdo(usize),
+}
 
 #[derive(Debug, Clone)]
 pub(super) struct Errors {
@@ -24,7 +29,7 @@ pub(super) struct Errors {
 
 impl Errors {
     pub(super) fn new() -> Self {
-        Self { active: [(ErrorCode::NO_ERROR, DEVICE); EMERGENCIES], producer: Producer::new(0) }
+        Self { active: [(ErrorCode::NO_ERROR, Cause::Device); EMERGENCIES], producer: Producer::new(0) }
     }
 
     pub(super) fn register(&self) -> u8 {
@@ -100,9 +105,9 @@ mod tests {
     #[test]
     fn the_register_follows_the_errors() {
         let mut errors = Errors::new();
-        errors.raise(ErrorCode::TEMPERATURE, DEVICE, [1; 5]).unwrap();
-        errors.raise(ErrorCode::LIFE_GUARD, ERROR_CONTROL, [0; 5]).unwrap();
-        errors.raise(ErrorCode::LIFE_GUARD, ERROR_CONTROL, [0; 5]).unwrap();
+        errors.raise(ErrorCode::TEMPERATURE, Cause::Device, [1; 5]).unwrap();
+        errors.raise(ErrorCode::LIFE_GUARD, Cause::Guarding, [0; 5]).unwrap();
+        errors.raise(ErrorCode::LIFE_GUARD, Cause::Guarding, [0; 5]).unwrap();
         assert_eq!(errors.register(), 0x19);
         errors.clear(|code, _| code == ErrorCode::TEMPERATURE, true).unwrap();
         errors.clear(|code, _| code == ErrorCode::TEMPERATURE, true).unwrap();
@@ -120,10 +125,10 @@ mod tests {
     fn an_error_too_many_is_sent_and_recorded() {
         let mut errors = Errors::new();
         for code in 0x1000..0x1008 {
-            errors.raise(ErrorCode(code), DEVICE, [0; 5]).unwrap();
+            errors.raise(ErrorCode(code), Cause::Device, [0; 5]).unwrap();
             errors.producer().poll_transmit(Duration::ZERO).unwrap();
         }
-        errors.raise(ErrorCode::TEMPERATURE, DEVICE, [0; 5]).unwrap();
+        errors.raise(ErrorCode::TEMPERATURE, Cause::Device, [0; 5]).unwrap();
         let sent = errors.producer().poll_transmit(Duration::ZERO).unwrap();
         assert_eq!((sent.code, sent.register), (ErrorCode::TEMPERATURE, 0x09));
         assert_eq!(errors.history().first(), Some(&0x4000));

@@ -8,8 +8,8 @@
 //! empties the error history, as the power-on values of the communication area do (CiA 301, 7.3.2.2.1), and
 //! ends errors of the communication; those of the device go on in the error register.
 //!
-//! Of the communication's errors, a lost master or node is there until it is back, an RPDO that was too short
-//! or is missing until one is taken: told once, and gone with 0000h.
+//! Of the communication's errors, a lost master or node is there until it is back or watched no more, an RPDO
+//! that was too short or is missing until one is taken: told once, and gone with 0000h.
 
 mod configure;
 mod errors;
@@ -40,7 +40,7 @@ pub use process::Objects;
 pub type Device<'a, H, const R: usize, const T: usize, const M: usize> =
     crate::od::Objects<crate::od::Dictionary<'a, H>, R, T, M>;
 
-use errors::{DEVICE, Errors};
+use errors::{Cause, Errors};
 
 /// Nodes whose heartbeat a slave watches: entries of 1016h that it acts on.
 pub const CONSUMERS: usize = 4;
@@ -207,7 +207,7 @@ impl<D: Objects> Slave<D> {
     /// # Errors
     /// [`emcy::ProducerFull`]: too many emergencies wait; the history has it all the same.
     pub fn raise(&mut self, code: ErrorCode, data: [u8; 5]) -> Result<(), emcy::ProducerFull> {
-        self.errors.raise(code, DEVICE, data)
+        self.errors.raise(code, Cause::Device, data)
     }
 
     /// Something was wrong and is over: sends an emergency and enters it into the history (1003h), nothing
@@ -221,7 +221,7 @@ impl<D: Objects> Slave<D> {
     /// # Errors
     /// [`emcy::ProducerFull`]: too many emergencies wait.
     pub fn clear(&mut self, code: ErrorCode) -> Result<(), emcy::ProducerFull> {
-        self.errors.clear(|active, cause| active == code && cause == DEVICE, true)
+        self.errors.clear(|active, cause| active == code && cause == Cause::Device, true)
     }
 
     /// Answers LSS after [`lss::Action::Store`].

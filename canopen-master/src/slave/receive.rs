@@ -5,7 +5,7 @@ use core::time::Duration;
 use embedded_can::Id;
 use pdo::{Frame, Handled, RpdoFault, cob};
 
-use super::errors::ERROR_CONTROL;
+use super::errors::Cause;
 use super::{Event, Objects, Slave};
 use crate::emcy::ErrorCode;
 use crate::nmt::{Change, Command};
@@ -47,7 +47,7 @@ impl<D: Objects> Slave<D> {
                 let (answer, event) = self.guard.handle_request(now, self.nmt.state());
                 self.answer(answer);
                 if let Some(event) = event {
-                    self.errors.clear_cause(ERROR_CONTROL);
+                    self.errors.clear_cause(Cause::Guarding);
                     self.tell(Event::LifeGuarding(event));
                 }
                 Handled::Taken
@@ -71,8 +71,8 @@ impl<D: Objects> Slave<D> {
     /// What RPDOs brought.
     pub(super) fn collect_pdos(&mut self) {
         while let Some((number, event)) = self.objects.poll_event() {
-            let cause = 0x1600 + number as u16;
-            let [low, high] = cause.to_le_bytes();
+            let cause = Cause::Rpdo(number);
+            let [low, high] = (0x1600 + number as u16).to_le_bytes();
             match event {
                 Ok(()) => self.errors.clear_cause(cause),
                 // Its beginning is taken.
@@ -154,14 +154,16 @@ impl<D: Objects> Slave<D> {
     }
 
     fn on_heartbeat(&mut self, now: Duration, id: u16, frame: &Frame) -> Handled {
-        let watched = self.consumers.iter_mut().flatten();
-        let mut watched = watched.filter(|(node, _)| cob::ERROR_CONTROL + u16::from(node.raw()) == id);
-        let Some((node, consumer)) = watched.next().filter(|_| !frame.is_remote()) else {
+        let mut watched = self.consumers.iter_mut().enumerate();
+        let watched = watched.find_map(|(index, slot)| {
+            let (node, consumer) = slot.as_mut()?;
+            (cob::ERROR_CONTROL + u16::from(node.raw()) == id).then_some((index, *node, consumer))
+        });
+        let Some((index, node, consumer)) = watched.filter(|_| !frame.is_remote()) else {
             return Handled::Ignored;
         };
-        let node = *node;
         if let Some(event) = consumer.handle(now) {
-            self.errors.clear_cause(ERROR_CONTROL);
+            self.errors.clear_cause(Cause::Heartbeat(index));
             self.tell(Event::Heartbeat { node, event });
         }
         Handled::Taken

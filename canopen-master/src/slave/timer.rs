@@ -4,7 +4,7 @@ use core::time::Duration;
 
 use pdo::{Frame, NodeId};
 
-use super::errors::ERROR_CONTROL;
+use super::errors::Cause;
 use super::objects::number;
 use super::{CONSUMERS, Event, Objects, Slave};
 use crate::bus::BusStatus;
@@ -51,7 +51,7 @@ impl<D: Objects> Slave<D> {
         self.collect_pdos();
         if let Some(event) = self.guard.handle_timeout(now) {
             self.tell(Event::LifeGuarding(event));
-            self.on_lost(now);
+            self.on_lost(now, Cause::Guarding);
         }
         for index in 0..CONSUMERS {
             let Some((node, consumer)) = self.consumers.get_mut(index).and_then(Option::as_mut) else {
@@ -60,7 +60,7 @@ impl<D: Objects> Slave<D> {
             let node = *node;
             if let Some(event) = consumer.handle_timeout(now) {
                 self.tell(Event::Heartbeat { node, event });
-                self.on_lost(now);
+                self.on_lost(now, Cause::Heartbeat(index));
             }
         }
         if let Some(event) = self.sync.handle_timeout(now) {
@@ -70,8 +70,8 @@ impl<D: Objects> Slave<D> {
 
     /// The master, or a node watched, is gone: emergency 8130h, and what 1029h:01 says (CiA 301,
     /// 7.5.2.26).
-    fn on_lost(&mut self, now: Duration) {
-        let _ = self.errors.raise(ErrorCode::LIFE_GUARD, ERROR_CONTROL, [0; 5]);
+    fn on_lost(&mut self, now: Duration, cause: Cause) {
+        let _ = self.errors.raise(ErrorCode::LIFE_GUARD, cause, [0; 5]);
         let next = match number(&mut self.objects, 0x1029, 1, 0) as u8 {
             0 if self.state() == State::Operational => State::PreOperational,
             2 => State::Stopped,

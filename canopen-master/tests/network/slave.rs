@@ -63,6 +63,29 @@ fn emergencies_that_wait_end_with_a_reset() {
     assert_eq!(sent(&mut slave, ms(1000)), ["701#00"]);
 }
 
+/// CiA 301, 7.2.7.1: the register tells what is left. A node that is watched no more is no error.
+#[test]
+fn each_lost_node_is_an_error_of_its_own() {
+    let [five, six] = [0x705, 0x706].map(|id| Frame::standard(id, [5]));
+    let mut slave = slave(Some(node(1)));
+    slave.objects_mut().set(0x1016, 1, &0x0005_0064_u32.to_le_bytes());
+    slave.objects_mut().set(0x1016, 2, &0x0006_0064_u32.to_le_bytes());
+    slave.boot(ms(0));
+    for (from, frames) in [(0, [five, six]), (200, [six, five])] {
+        frames.iter().for_each(|frame| assert!(slave.handle_frame(ms(from), frame).is_taken()));
+        sent(&mut slave, ms(from));
+        slave.handle_timeout(ms(from + 100));
+        assert_eq!(sent(&mut slave, ms(from + 100)), ["081#3081110000000000"; 2]);
+        slave.handle_frame(ms(from + 100), &five);
+        assert_eq!(sent(&mut slave, ms(from + 100)), ["081#0000110000000000"]);
+        assert_eq!(slave.error_register(), 0x11);
+    }
+    let unwatch = Frame::standard(0x601, [0x23, 0x16, 0x10, 2, 0, 0, 0, 0]);
+    slave.handle_frame(ms(300), &unwatch);
+    assert_eq!(sent(&mut slave, ms(300)), ["081#0000000000000000", "581#6016100200000000"]);
+    assert_eq!(slave.error_register(), 0);
+}
+
 /// What was wrong for a moment leaves the error register as it was.
 #[test]
 fn errors_that_are_over_when_told() {
