@@ -22,18 +22,17 @@ pub(super) enum Cause {
 
 #[derive(Debug, Clone)]
 pub(super) struct Errors {
-    /// [`ErrorCode::NO_ERROR`] where there is room.
-    active: [(ErrorCode, Cause); EMERGENCIES],
+    active: [Option<(ErrorCode, Cause)>; EMERGENCIES],
     producer: Producer<EMERGENCIES>,
 }
 
 impl Errors {
     pub(super) fn new() -> Self {
-        Self { active: [(ErrorCode::NO_ERROR, Cause::Device); EMERGENCIES], producer: Producer::new(0) }
+        Self { active: [None; EMERGENCIES], producer: Producer::new(0) }
     }
 
     pub(super) fn register(&self) -> u8 {
-        self.active.iter().fold(0, |register, (code, _)| register | code.register_bit())
+        self.active.iter().flatten().fold(0, |register, (code, _)| register | code.register_bit())
     }
 
     pub(super) const fn producer(&mut self) -> &mut Producer<EMERGENCIES> {
@@ -50,12 +49,12 @@ impl Errors {
     }
 
     pub(super) fn raise(&mut self, code: ErrorCode, cause: Cause, data: [u8; 5]) -> Result<(), ProducerFull> {
-        if self.active.contains(&(code, cause)) {
+        if self.active.contains(&Some((code, cause))) {
             return Ok(());
         }
         // One without room is told all the same, as if it were over.
-        if let Some(room) = self.active.iter_mut().find(|(code, _)| *code == ErrorCode::NO_ERROR) {
-            *room = (code, cause);
+        if let Some(room) = self.active.iter_mut().find(|slot| slot.is_none()) {
+            *room = Some((code, cause));
         }
         self.send(code, data)
     }
@@ -78,17 +77,10 @@ impl Errors {
         told: bool,
     ) -> Result<(), ProducerFull> {
         let mut any = false;
-        for (code, cause) in &mut self.active {
-            if *code != ErrorCode::NO_ERROR && gone(*code, *cause) {
-                *code = ErrorCode::NO_ERROR;
-                any = true;
-            }
+        for slot in &mut self.active {
+            any |= slot.take_if(|(code, cause)| gone(*code, *cause)).is_some();
         }
-        if !(any && told) {
-            return Ok(());
-        }
-        let register = self.register();
-        self.producer.push(Emergency { code: ErrorCode::NO_ERROR, register, data: [0; 5] })
+        if any && told { self.send(ErrorCode::NO_ERROR, [0; 5]) } else { Ok(()) }
     }
 
     /// All errors of a cause are gone.
