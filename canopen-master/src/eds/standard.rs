@@ -121,7 +121,7 @@ const OBJECTS: &[StandardObject] = &[
     row(0x6099, 0x6099, "Homing speeds", "homing speeds", ARRAY, U32),
     row(0x609A, 0x609A, "Homing acceleration", "homing acceleration", VAR, U32),
     row(0x60C1, 0x60C1, "Interpolation data record", "interpolation data", RECORD, I32),
-    row(0x60C2, 0x60C2, "Interpolation time period", "interpolation period", RECORD, I8),
+    row(0x60C2, 0x60C2, "Interpolation time period", "interpolation period", RECORD, U8),
     row(0x60F4, 0x60F4, "Following error actual value", "following error actual", VAR, I32),
     row(0x60FD, 0x60FD, "Digital inputs", "digital inputs", VAR, U32),
     row(0x60FE, 0x60FE, "Digital outputs", "digital outputs", ARRAY, U32),
@@ -137,7 +137,7 @@ pub fn standard_object(index: u16) -> Option<&'static StandardObject> {
 
 /// What a sub-object of a standard object is in short, and its type; `None` where the object says it.
 #[must_use]
-pub const fn standard_sub_object(index: u16, subindex: u8) -> Option<(&'static str, DataType)> {
+pub fn standard_sub_object(index: u16, subindex: u8) -> Option<(&'static str, DataType)> {
     Some(match (index, subindex) {
         (0x1018, 1) => ("vendor", U32),
         (0x1018, 2) => ("product", U32),
@@ -145,16 +145,17 @@ pub const fn standard_sub_object(index: u16, subindex: u8) -> Option<(&'static s
         (0x1018, 4) => ("serial number", U32),
         (0x1400..=0x15FF | 0x1800..=0x19FF, 1) => ("identifier", U32),
         (0x1400..=0x15FF | 0x1800..=0x19FF, 2) => ("transmission type", U8),
-        (0x1800..=0x19FF, 3) => ("inhibit time in 100 us", U16),
+        (0x1400..=0x15FF | 0x1800..=0x19FF, 3) => ("inhibit time in 100 us", U16),
+        (0x1400..=0x15FF | 0x1800..=0x19FF, 4) => ("reserved", U8),
         (0x1400..=0x15FF | 0x1800..=0x19FF, 5) => ("event timer in ms", U16),
         (0x1800..=0x19FF, 6) => ("SYNC start value", U8),
         (0x1600..=0x17FF | 0x1A00..=0x1BFF, 0) => ("number of objects", U8),
         (0x1200..=0x12FF, 1) => ("identifier to the server", U32),
         (0x1200..=0x12FF, 2) => ("identifier from the server", U32),
         (0x1200..=0x12FF, 3) => ("node", U8),
-        (0x1016 | 0x1018 | 0x1003 | 0x1010 | 0x1011 | 0x1029 | 0x6000 | 0x6200 | 0x6401 | 0x6411, 0) => {
-            ("number of entries", U8)
-        }
+        (0x60C2, 1) => ("value", U8),
+        (0x60C2, 2) => ("power of ten in s", I8),
+        (_, 0) if standard_object(index)?.object_type != VAR => ("number of entries", U8),
         _ => return None,
     })
 }
@@ -188,6 +189,8 @@ pub fn standard_name(index: u16, subindex: Option<u8>) -> Option<String> {
         (0x1400..=0x15FF | 0x1800..=0x19FF, 3) => "Inhibit time",
         (0x1400..=0x15FF | 0x1800..=0x19FF, 5) => "Event timer",
         (0x1800..=0x19FF, 6) => "SYNC start value",
+        (0x60C2, 1) => "Interpolation time period value",
+        (0x60C2, 2) => "Interpolation time index",
         (0x1600..=0x17FF | 0x1A00..=0x1BFF, 0) => "Number of mapped application objects in PDO",
         (0x1600..=0x17FF | 0x1A00..=0x1BFF, _) => return Some(format!("Application object {subindex}")),
         (_, 0) => "Highest sub-index supported",
@@ -212,5 +215,20 @@ mod tests {
         assert_eq!(standard_object(0x15FF).map(|object| object.words), Some("RPDO"));
         assert_eq!(standard_object(0x1003).map(|object| object.object_type), Some(ObjectType::ARRAY));
         assert_eq!(standard_name(0x2000, None), None);
+    }
+
+    /// CiA 301, 7.5.2.35 and 7.5.2.37; CiA 402-2, 60C2h.
+    #[test]
+    fn sub_objects_that_differ_from_their_object() {
+        let data_type = |index, sub| standard_sub_object(index, sub).map(|(_, data_type)| data_type);
+        for object in OBJECTS {
+            let count = (object.object_type != VAR).then_some(U8);
+            assert_eq!(data_type(object.indices.0, 0), count, "{}", object.name);
+        }
+        for index in [0x1400, 0x1800] {
+            assert_eq!([1, 2, 3, 4, 5].map(|sub| data_type(index, sub)), [U32, U8, U16, U8, U16].map(Some));
+        }
+        assert_eq!([1, 2].map(|sub| data_type(0x60C2, sub)), [Some(U8), Some(I8)]);
+        assert_eq!(data_type(0x2000, 0), None);
     }
 }
