@@ -182,6 +182,12 @@ impl<D: Objects> Slave<D> {
         self.nmt.state()
     }
 
+    /// The identifier of the SYNC that it listens to (1005h).
+    #[must_use]
+    pub const fn sync_id(&self) -> u16 {
+        self.sync.id()
+    }
+
     /// The dictionary.
     #[must_use]
     pub const fn objects(&self) -> &D {

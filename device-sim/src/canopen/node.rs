@@ -259,6 +259,8 @@ impl<D: Device> can::Node for Node<D> {
         let asked = self.node().map(|node| cob::SDO_REQUEST + u16::from(node.raw()));
         if self.is_operational() || frame.standard_id() == asked {
             self.with(now, Device::update);
+        }
+        if frame.standard_id() == Some(self.slave.sync_id()) {
             self.watch(now, true);
         }
         self.slave.handle_frame(now, frame);

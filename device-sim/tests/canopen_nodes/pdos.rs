@@ -109,6 +109,21 @@ fn an_acyclic_pdo_follows_a_change() {
     assert_eq!(syncs(&mut bench), [""; 0]);
 }
 
+/// Whatever other frame comes while an input is different.
+#[test]
+fn only_the_sync_looks_for_a_change_of_an_acyclic_pdo() {
+    let mut bench = Bench::new(RemoteIo::node(id(5), 1, false), Faults::NONE);
+    bench.put(0x1800, 2, &[0]);
+    bench.send(START);
+    bench.send(SYNC);
+    bench.heard();
+    set_inputs(&mut bench, 0x80);
+    bench.send(Frame::standard(0x205, [0x3C]));
+    set_inputs(&mut bench, 0);
+    bench.send(SYNC);
+    assert_eq!(bench.heard(), [""; 0]);
+}
+
 /// 1800h:03: changes within the inhibit time go out together after it; 1800h:05: a PDO without change.
 #[test]
 fn inhibit_time_and_event_timer() {
