@@ -475,6 +475,31 @@ fn what_is_not_known_is_not_told_as_known() {
     assert!(segments.iter().all(|segment| segment.get("index").is_none()), "{objects:?}");
 }
 
+/// The first one that cannot be read was the end of all.
+#[test]
+fn what_cannot_be_read_keeps_no_other_capture_from_being_decoded() {
+    let bench = Bench::new();
+    std::fs::write(bench.path("log"), "can0 701#05\n").unwrap();
+    std::fs::write(bench.path("letter"), "Dear reader,\n").unwrap();
+    let files = ["decode", "missing", "log", "letter", "log"];
+    let ran = bench
+        .run(&[&files[..], &["--json"]].concat())
+        .ends(5)
+        .says("missing")
+        .says("letter: no known capture");
+    let kinds: Vec<Value> = ran.stdout().lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    expect(
+        &kinds,
+        &[
+            json!({ "kind": "heartbeat" }),
+            json!({ "kind": "heartbeat" }),
+            json!({ "kind": "summary", "frames": 2 }),
+        ],
+    );
+    let ran = bench.run(&files).ends(5).says("missing").says("letter: no known capture");
+    assert!(ran.stdout().ends_with("\n2 frames: 2 heartbeat\n"), "{}", ran.stdout());
+}
+
 /// An FD frame was `123 Fd { bit_rate_switch: true, error_passive: false } [3] 11 22 33`.
 #[test]
 fn an_fd_frame_is_told_in_words() {

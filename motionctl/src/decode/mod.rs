@@ -132,12 +132,15 @@ fn named(counts: &[u64; NAMES.len()]) -> impl Iterator<Item = (&'static str, u64
 enum Stop {
     /// The reader of standard output has had enough.
     Enough,
-    Failed(Exit),
+    /// Standard output takes no more.
+    Output(Exit),
+    /// A capture cannot be read.
+    Capture(Exit),
 }
 
 impl From<Exit> for Stop {
     fn from(exit: Exit) -> Self {
-        Self::Failed(exit)
+        Self::Capture(exit)
     }
 }
 
@@ -145,7 +148,7 @@ impl From<io::Error> for Stop {
     fn from(error: io::Error) -> Self {
         match error.kind() {
             io::ErrorKind::BrokenPipe => Self::Enough,
-            _ => Self::Failed(Exit::file("standard output", &error)),
+            _ => Self::Output(Exit::file("standard output", &error)),
         }
     }
 }
@@ -154,12 +157,21 @@ pub(crate) fn run(out: &Output, args: &Decode) -> Result<(), Exit> {
     let names = Names::read(&args.reading.eds, &args.reading.linmot)?;
     let mut totals = Totals::default();
     let mut stdout = BufWriter::with_capacity(BLOCK, io::stdout().lock());
+    let mut unreadable = None;
     let mut decode = || -> Result<(), Stop> {
         for file in &args.files {
             if !out.json && args.files.len() > 1 {
                 writeln!(stdout, "== {file}")?;
             }
-            decode_file(out, args, file, &names, &mut totals, &mut stdout)?;
+            match decode_file(out, args, file, &names, &mut totals, &mut stdout) {
+                // The others are decoded all the same.
+                Err(Stop::Capture(exit)) => {
+                    if let Some(before) = unreadable.replace(exit) {
+                        out.failed(&before);
+                    }
+                }
+                done => done?,
+            }
         }
         if out.json {
             json::summary(&totals, &mut stdout)?;
@@ -169,8 +181,8 @@ pub(crate) fn run(out: &Output, args: &Decode) -> Result<(), Exit> {
         Ok(stdout.flush()?)
     };
     match decode() {
-        Ok(()) | Err(Stop::Enough) => Ok(()),
-        Err(Stop::Failed(exit)) => Err(exit),
+        Ok(()) | Err(Stop::Enough) => unreadable.map_or(Ok(()), Err),
+        Err(Stop::Output(exit) | Stop::Capture(exit)) => Err(exit),
     }
 }
 
@@ -216,7 +228,7 @@ pub(crate) fn decode_lb2<R: Read>(
 ) -> Result<(), Exit> {
     match lb2::decode(json, file, reader, &mut Totals::default(), to, damaged) {
         Ok(()) | Err(Stop::Enough) => Ok(()),
-        Err(Stop::Failed(exit)) => Err(exit),
+        Err(Stop::Output(exit) | Stop::Capture(exit)) => Err(exit),
     }
 }
 
@@ -228,26 +240,27 @@ fn decode_can<R: Read>(
     totals: &mut Totals,
     stdout: &mut impl Write,
 ) -> Result<(), Stop> {
-    loop {
-        match reader.next().map_err(|error| Exit::file(file, &error))? {
-            None => break,
-            Some(Item::Damage(damage)) => {
+    let read = loop {
+        match reader.next() {
+            Err(error) => break Err(Exit::file(file, &error)),
+            Ok(None) => break Ok(()),
+            Ok(Some(Item::Damage(damage))) => {
                 totals.damaged += 1;
                 report(file, &damage);
                 continue;
             }
-            Some(Item::Frame(_)) => {}
+            Ok(Some(Item::Frame(_))) => {}
         }
         ear.hear_next(&reader, teller, totals);
         if teller.text().len() >= BLOCK {
             stdout.write_all(teller.text())?;
             teller.text().clear();
         }
-    }
+    };
     ear.finish(teller);
     stdout.write_all(teller.text())?;
     teller.text().clear();
-    Ok(())
+    Ok(read?)
 }
 
 /// A line that gave no frame, on standard error.
