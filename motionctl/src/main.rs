@@ -73,13 +73,10 @@ fn main() -> ExitCode {
             rendered.map_err(|error| exit::Exit::file("the manual page", &error))
         }
     };
-    match done.and_then(|()| output::lost()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(exit) => {
-            out.failed(&exit);
-            ExitCode::from(exit.status)
-        }
-    }
+    // A result that nobody could read is none.
+    let troubles = [done, output::lost()].into_iter().filter_map(Result::err);
+    let status = troubles.inspect(|exit| out.failed(exit)).last().map(|exit| exit.status);
+    status.map_or(ExitCode::SUCCESS, ExitCode::from)
 }
 
 fn ports(out: &output::Output) -> Result<(), exit::Exit> {

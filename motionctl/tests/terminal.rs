@@ -70,6 +70,19 @@ fn a_full_disk_is_trouble() {
     assert!(error.contains("standard output"), "{error}");
 }
 
+/// That there are errors was told, but not that nobody can read which.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_failed_check_does_not_hide_a_full_disk() {
+    let bench = Bench::new();
+    std::fs::write(bench.path("letter.eds"), "Dear reader,\n").unwrap();
+    let check = ["eds", "check", "letter.eds"];
+    bench.run(&check).ends(1);
+    let full = File::options().write(true).open("/dev/full").unwrap();
+    let ended = common::Ran(motionctl(&bench, &check).stdout(full).output().unwrap());
+    ended.ends(5).says("letter.eds: ").says("standard output: ");
+}
+
 /// What writes flash asks on a terminal, and nowhere else; `--yes` answers.
 #[test]
 fn flash_is_asked_for_on_a_terminal() {
