@@ -6,14 +6,17 @@
 // The program, with motion-io, is what reads the machine's clock.
 #![allow(clippy::disallowed_methods)]
 
-/// As std's, but that nobody reads to the end, as with `| head`, is no trouble.
+/// As std's, but that nobody reads to the end, as with `| head`, is no trouble, and what it says is
+/// [`harmless`](output::harmless).
 macro_rules! println {
-    ($($words:tt)*) => { $crate::output::put(format!("{}\n", format_args!($($words)*))) };
+    ($($words:tt)*) => { $crate::output::put_text(&format!("{}\n", format_args!($($words)*))) };
 }
 
-/// As std's, but that nobody listens is no trouble.
+/// As std's, but that nobody listens is no trouble, and what it says is [`harmless`](output::harmless).
 macro_rules! eprintln {
-    ($($words:tt)*) => { $crate::output::complain(format_args!("{}\n", format_args!($($words)*))) };
+    ($($words:tt)*) => {
+        $crate::output::complain(&$crate::output::harmless(&format!("{}\n", format_args!($($words)*))))
+    };
 }
 
 mod can;

@@ -1,6 +1,7 @@
 //! What goes to standard output and standard error.
 
 use core::cell::RefCell;
+use std::borrow::Cow;
 use std::io::{BufWriter, ErrorKind, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -50,7 +51,7 @@ impl Output {
                 whole.insert("remarks".into(), json!(remarks));
             }
         }
-        println!("{whole}");
+        put(format!("{whole}\n"));
     }
 
     /// A line of a stream: one JSON object, or what `text` says.
@@ -83,7 +84,7 @@ impl Output {
     pub(crate) fn failed(&self, exit: &Exit) {
         let (red, plain) =
             if self.colors(std::io::stderr().is_terminal()) { ("\x1b[31m", "\x1b[0m") } else { ("", "") };
-        eprintln!("{red}error:{plain} {}", exit.message);
+        complain(&format!("{red}error:{plain} {}\n", harmless(&exit.message)));
     }
 
     /// A progress bar on standard error, where that is a terminal.
@@ -111,7 +112,7 @@ impl Output {
         if !std::io::stdin().is_terminal() {
             return Err(Exit::usage(format!("{question} Without a terminal to ask on, --yes must say so")));
         }
-        complain(format_args!("{question} [y/N] "));
+        complain(&harmless(&format!("{question} [y/N] ")));
         let mut answer = String::new();
         std::io::stdin().read_line(&mut answer).map_err(|error| Exit::file("standard input", &error))?;
         match answer.trim() {
@@ -142,9 +143,46 @@ pub(crate) fn lost() -> Result<(), Exit> {
     LOST.get().map_or(Ok(()), |error| Err(Exit::file("standard output", error)))
 }
 
+/// The same of text for people, made [`harmless`].
+pub(crate) fn put_text(text: &str) {
+    put(harmless(text).as_bytes());
+}
+
 /// Writes to standard error, if anybody listens.
-pub(crate) fn complain(text: core::fmt::Arguments<'_>) {
-    let _ = std::io::stderr().write_fmt(text);
+pub(crate) fn complain(text: &str) {
+    let _ = std::io::stderr().write_all(text.as_bytes());
+}
+
+/// Text without control characters, which would steer a terminal: names come from files and devices. They are
+/// written as in Rust, `\u{1b}`; line ends and tabs remain.
+pub(crate) fn harmless(text: &str) -> Cow<'_, str> {
+    let harms = |letter: char| letter.is_control() && !matches!(letter, '\n' | '\t');
+    if !text.contains(harms) {
+        return text.into();
+    }
+    let mut harmless = String::with_capacity(text.len());
+    for letter in text.chars() {
+        match harms(letter) {
+            true => harmless.extend(letter.escape_default()),
+            false => harmless.push(letter),
+        }
+    }
+    harmless.into()
+}
+
+/// Makes text for people [`harmless`] on its way; each piece is written whole.
+#[derive(Debug)]
+pub(crate) struct Harmless<W>(pub(crate) W);
+
+impl<W: Write> Write for Harmless<W> {
+    fn write(&mut self, text: &[u8]) -> std::io::Result<usize> {
+        self.0.write_all(harmless(&String::from_utf8_lossy(text)).as_bytes())?;
+        Ok(text.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        self.0.flush()
+    }
 }
 
 /// Writes a file beside its place and moves it there when it is complete, so that an older one is never half

@@ -58,6 +58,37 @@ fn a_reader_that_goes_is_no_trouble() {
     head(&bench, &["run", "run.toml", "--json"], 1);
 }
 
+/// Names of files and of what is in them could move the cursor, or put words into the terminal's mouth.
+#[test]
+fn names_cannot_steer_the_terminal() {
+    let bench = Bench::new();
+    let eds = "[DeviceInfo]\nVendorName=\u{1b}]0;title\u{7}\n[MandatoryObjects]\nSupportedObjects=1\n1=0x1000\n\
+               [1000]\nParameterName=Type \u{1b}[2J\u{9b}2J\nObjectType=0x7\nDataType=0x0007\nAccessType=ro\n";
+    std::fs::write(bench.path("a.eds"), eds).unwrap();
+    std::fs::write(bench.path("log"), "can\u{7} 601#4000100000000000\ncan\u{7} 581#4300100000000000\n")
+        .unwrap();
+    let lb2 = "82 96 05 CC 30 05 00 FC\n";
+    std::fs::write(bench.path("line\u{1b}[2J"), lb2).unwrap();
+    for (arguments, words) in [
+        (&["eds", "show", "a.eds"][..], "Type \\u{1b}[2J\\u{9b}2J"),
+        (&["eds", "check", "a.eds"], "a.eds"),
+        (&["decode", "log", "--eds", "1=a.eds"], "Type \\u{1b}[2J"),
+        (&["decode", "log", "--eds", "1=a.eds", "--frames"], "can\\u{7}"),
+        (&["decode", "line\u{1b}[2J", "log"], "== line\\u{1b}[2J\n"),
+        (&["monitor", "--once", "log", "--eds", "1=a.eds"], "can\\u{7}"),
+        (&["monitor", "--once", "line\u{1b}[2J"], "line\\u{1b}[2J  1 LB2"),
+        (&["decode", "no\u{1b}[2J"], "error: no\\u{1b}[2J"),
+    ] {
+        let ran = bench.run(arguments).says(words);
+        let said = ran.stdout() + &ran.stderr();
+        let steers = |letter: char| letter.is_control() && letter != '\n';
+        assert!(!said.contains(steers), "{arguments:?}: {said:?}");
+    }
+    // A program gets them as they are.
+    let json = bench.run(&["monitor", "--once", "log", "--json"]).ends(0).json();
+    assert_eq!(json["nodes"][0]["bus"], "can\u{7}");
+}
+
 /// Other trouble with standard output is told.
 #[cfg(target_os = "linux")]
 #[test]

@@ -17,7 +17,7 @@ use canopen_master::trace::Kind;
 use motion_io::capture::{Capture, CaptureError, Damage, FrameKind, Item, Lb2Reader, Reader};
 
 use crate::exit::Exit;
-use crate::output::Output;
+use crate::output::{Harmless, Output};
 use cli::Decode;
 pub(crate) use hear::{Ear, Teller, number_of};
 use json::Json;
@@ -156,7 +156,9 @@ impl From<io::Error> for Stop {
 pub(crate) fn run(out: &Output, args: &Decode) -> Result<(), Exit> {
     let names = Names::read(&args.reading.eds, &args.reading.linmot)?;
     let mut totals = Totals::default();
-    let mut stdout = BufWriter::with_capacity(BLOCK, io::stdout().lock());
+    let stdout = io::stdout().lock();
+    let stdout: Box<dyn Write> = if out.json { Box::new(stdout) } else { Box::new(Harmless(stdout)) };
+    let mut stdout = BufWriter::with_capacity(BLOCK, stdout);
     let mut unreadable = None;
     let mut decode = || -> Result<(), Stop> {
         for file in &args.files {

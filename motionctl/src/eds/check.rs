@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use super::cli::Input;
 use super::{bytes, counts, diagnostic_json, kind_word, read_bytes};
 use crate::exit::Exit;
-use crate::output::{Output, put};
+use crate::output::{Output, put_text};
 
 pub(super) fn run(out: &Output, input: &Input, lenient: bool, strict: bool) -> Result<(), Exit> {
     let name = input.file.display().to_string();
@@ -39,7 +39,7 @@ pub(super) fn run(out: &Output, input: &Input, lenient: bool, strict: bool) -> R
         let lines: String = diagnostics.iter().map(|diagnostic| line(&name, diagnostic)).collect();
         let kind = kind_word(&reading);
         let encoding = reading.source.encoding.name();
-        put(format!("{lines}{name}: {kind}, {encoding}, {objects} objects, {entries} entries\n"));
+        put_text(&format!("{lines}{name}: {kind}, {encoding}, {objects} objects, {entries} entries\n"));
     });
     let total = format!("{name}: {errors} errors, {warnings} warnings");
     if errors == 0 && !(strict && warnings > 0) {

@@ -8,7 +8,7 @@ use serde_json::{Map, Value, json};
 use super::cli::Input;
 use super::{kind_word, place, read};
 use crate::exit::Exit;
-use crate::output::{Output, put};
+use crate::output::{Output, put_text};
 
 pub(super) fn run(
     out: &Output,
@@ -77,7 +77,7 @@ pub(super) fn run(
         for (object, entries) in &objects {
             put_object(&mut text, object, entries, node);
         }
-        put(&text);
+        put_text(&text);
     });
     Ok(())
 }

@@ -107,6 +107,6 @@ fn once(
         }
         subject.advance(screen::TURN)?;
     }
-    out.document(subject.document(), || crate::output::put(subject.sheet().text()));
+    out.document(subject.document(), || crate::output::put_text(&subject.sheet().text()));
     Ok(())
 }

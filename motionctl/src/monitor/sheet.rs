@@ -1,5 +1,7 @@
 //! Tables as they are shown, on a screen or as plain text.
 
+use crate::output::harmless;
+
 /// How a row is to strike the eye.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) enum Tone {
@@ -60,13 +62,10 @@ impl Table {
         Self { title, columns, rows: Vec::new(), empty, tail: false }
     }
 
-    /// Adds a row. Characters that would move a terminal's cursor are replaced: names come from devices.
+    /// Adds a row. What is in a cell remains in its line.
     pub(super) fn push(&mut self, tone: Tone, cells: impl IntoIterator<Item = String>) {
-        let clean = |cell: String| match cell.contains(char::is_control) {
-            true => cell.replace(char::is_control, "\u{FFFD}"),
-            false => cell,
-        };
-        self.rows.push(Row { cells: cells.into_iter().map(clean).collect(), tone });
+        let line = |cell: String| harmless(&cell).replace(['\n', '\t'], " ");
+        self.rows.push(Row { cells: cells.into_iter().map(line).collect(), tone });
     }
 
     /// Characters that each column needs.
@@ -128,12 +127,12 @@ mod tests {
     #[test]
     fn plain_text_stands_in_columns() {
         let mut table = Table::new("Nodes", &["node>", "name"], "nobody");
-        table.push(Tone::Plain, ["1".into(), "SD\u{1b}[2J".into()]);
+        table.push(Tone::Plain, ["1".into(), "SD\u{1b}[2J\n03".into()]);
         table.push(Tone::Bad, ["127".into(), String::new()]);
         let sheet = Sheet { head: "bus".into(), tables: vec![table, Table::new("Rest", &[], "nothing")] };
         assert_eq!(
             sheet.text(),
-            "bus\n\nNodes\n  node  name\n     1  SD\u{FFFD}[2J\n   127\n\nRest\n  nothing\n"
+            "bus\n\nNodes\n  node  name\n     1  SD\\u{1b}[2J 03\n   127\n\nRest\n  nothing\n"
         );
     }
 }
