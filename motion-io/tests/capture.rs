@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use motion_io::capture::{
-    Capture, Direction, Format, Frame, FrameKind, Item, Record, Time, Times, WriteFormat, Writer, open,
+    Capture, Chunk, Direction, Format, Frame, FrameKind, Item, Record, Time, Times, WriteFormat, Writer, open,
 };
 
 const DATA: FrameKind = FrameKind::Data;
@@ -456,6 +456,24 @@ fn what_stands_behind_the_data_of_a_log_line_is_told() {
         damage,
         ["line 1: R, T or nothing expected behind the data: \"(1.4) can0 605#230018018501 0080\""]
     );
+}
+
+/// The first line with it was damage.
+#[test]
+fn a_byte_order_mark_before_lb2_hex_text_is_no_damage() {
+    let content = b"\xEF\xBB\xBF82 96 02 40 42\n";
+    let Capture::Lb2(mut reader) = open(&content[..]).unwrap() else { panic!("CAN") };
+    let first = reader.next().unwrap();
+    assert!(matches!(first, Some(Chunk::Bytes { bytes: [0x82, 0x96, 2, 0x40, 0x42], .. })), "{first:?}");
+    assert!(reader.next().unwrap().is_none());
+}
+
+/// Nothing behind the first 400 lines was looked at.
+#[test]
+fn a_log_behind_many_lines_of_comment_is_recognised() {
+    let comment = "# a note\n".repeat(1000);
+    let (format, frames, _) = read(format!("{comment}(1.0) can0 701#05\n").as_bytes());
+    assert_eq!((format, frames.len()), (Format::Candump, 1));
 }
 
 /// Each of these lines was taken for nothing, or for the first of its frames.

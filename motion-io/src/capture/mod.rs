@@ -97,7 +97,11 @@ pub fn open_as<R: Read>(source: R, format: Format) -> Result<Capture<R>, Capture
     open_as_input(input::Input::new(source), format)
 }
 
-fn open_as_input<R: Read>(input: input::Input<R>, format: Format) -> Result<Capture<R>, CaptureError> {
+fn open_as_input<R: Read>(mut input: input::Input<R>, format: Format) -> Result<Capture<R>, CaptureError> {
+    let is_text = !matches!(format, Format::Pcap | Format::Lb2Raw);
+    if is_text && input.peek(sniff::BYTE_ORDER_MARK.len())? == sniff::BYTE_ORDER_MARK {
+        input.take(sniff::BYTE_ORDER_MARK.len());
+    }
     Ok(match format {
         Format::Lb2Raw => Capture::Lb2(Lb2Reader::raw(input)),
         Format::Lb2Hex => Capture::Lb2(Lb2Reader::hex(input)),

@@ -98,12 +98,7 @@ pub struct Reader<R> {
 impl<R: Read> Reader<R> {
     pub(super) fn new(mut input: Input<R>, format: Format) -> Result<Self, CaptureError> {
         let parser = match TextParser::new(format) {
-            Some(parser) => {
-                if input.peek(3)? == b"\xEF\xBB\xBF" {
-                    input.take(3);
-                }
-                Parser::Text(parser)
-            }
+            Some(parser) => Parser::Text(parser),
             None => Parser::Pcap(Box::new(Pcap::open(&mut input)?)),
         };
         Ok(Self {

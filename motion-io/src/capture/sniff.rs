@@ -8,8 +8,8 @@ use super::record::{Buses, Record, Time};
 
 /// How much of the content is looked at.
 pub(super) const LOOK_AHEAD: usize = 64 * 1024;
-/// How many lines.
-const LINES: usize = 400;
+/// How a text may begin that is UTF-8.
+pub(super) const BYTE_ORDER_MARK: &[u8] = b"\xEF\xBB\xBF";
 
 /// How compressed files begin.
 const COMPRESSED: [(&[u8], &str); 5] = [
@@ -61,7 +61,7 @@ pub(super) fn recognise(start: &[u8]) -> Result<Format, CaptureError> {
     if is_pcap(start) {
         return Ok(Format::Pcap);
     }
-    let text = start.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(start);
+    let text = start.strip_prefix(BYTE_ORDER_MARK).unwrap_or(start);
     if text.iter().all(u8::is_ascii_whitespace) {
         return Ok(Format::Candump);
     }
@@ -71,7 +71,7 @@ pub(super) fn recognise(start: &[u8]) -> Result<Format, CaptureError> {
     if let Some((_, by)) = COMPRESSED.iter().find(|(magic, _)| start.starts_with(magic)) {
         return Err(CaptureError::Compressed(by));
     }
-    let lines = || text.split(|&byte| byte == b'\n').map(<[u8]>::trim_ascii).take(LINES);
+    let lines = || text.split(|&byte| byte == b'\n').map(<[u8]>::trim_ascii);
     for line in lines() {
         if line.starts_with(b";$FILEVERSION=") {
             return Ok(Format::Trc);
