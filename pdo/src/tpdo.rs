@@ -60,7 +60,7 @@ impl Tpdo {
     }
 
     /// What has changed is not worth a PDO: takes back what [`trigger`](Self::trigger), the event timer or
-    /// the beginning of an event-driven PDO asked for.
+    /// the beginning of an event-driven PDO asked for. The event timer runs again from the next PDO on.
     #[inline]
     pub fn withdraw(&mut self) {
         self.pending = false;

@@ -73,8 +73,8 @@ impl<'a> Builder<'a> {
             if needed > room {
                 let line = self.declared.get(&object.index).map_or(0, |declared| declared.section.line);
                 let message = format!(
-                    "CompactSubObj={count} passed over: the sub-objects of this file take {} MiB already",
-                    (COMPACT_ROOM - room) >> 20
+                    "CompactSubObj={count} passed over: with it, the sub-objects of this file take more than {} MiB",
+                    COMPACT_ROOM >> 20
                 );
                 findings.add(line, Rule::Compact, message);
                 continue;

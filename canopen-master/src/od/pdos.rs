@@ -69,6 +69,7 @@ impl<const M: usize> PdoSlot<M> {
             // The inhibit time and the start value must not change while the PDO is valid.
             (false, _) if valid => return Err(AbortCode::INVALID_VALUE),
             (false, 3) => com.inhibit = value as u16,
+            // 06h, the start value: nothing else is left that can be read.
             (false, _) if value > 240 => return Err(AbortCode::TOO_HIGH),
             (false, _) => com.sync_start = value as u8,
             (true, _) if valid => return Err(AbortCode::UNSUPPORTED_ACCESS),
@@ -222,8 +223,8 @@ impl<const R: usize, const T: usize, const M: usize> Pdos<R, T, M> {
         }
     }
 
-    /// What [`trigger`](Self::trigger), the event timer or the start of an event-driven TPDO asked for is
-    /// not sent after all: the device profile holds the event back.
+    /// TPDO `number` (from 0) is not sent after all, whether [`trigger`](Self::trigger), the event timer or the
+    /// start asked for it: the device profile holds the event back. A remote frame is still answered.
     pub fn withdraw(&mut self, number: usize) {
         if let Some(tpdo) = self.tpdos.get_mut(number) {
             tpdo.withdraw();

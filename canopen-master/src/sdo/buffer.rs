@@ -158,12 +158,12 @@ impl Buffer for &[u8] {
     }
 }
 
-/// An upload replaces what the vector held; what it allocates grows with the data that came, not with
-/// the size that the server indicated.
 /// What a `Vec` takes at most, in bytes.
 #[cfg(feature = "alloc")]
 const MOST: usize = 16 << 20;
 
+/// An upload replaces what the vector held; what it allocates grows with the data that came, not with
+/// the size that the server indicated.
 #[cfg(feature = "alloc")]
 impl Buffer for alloc::vec::Vec<u8> {
     /// Room for 16 MiB, so that a server that never ends does not take all memory.

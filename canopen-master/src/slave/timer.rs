@@ -69,7 +69,7 @@ impl<D: Objects> Slave<D> {
     }
 
     /// The master, or a node watched, is gone: emergency 8130h, and what 1029h:01 says (CiA 301,
-    /// 7.5.2.26).
+    /// 7.5.2.32).
     fn on_lost(&mut self, now: Duration, cause: Cause) {
         let _ = self.errors.raise(ErrorCode::LIFE_GUARD, cause, [0; 5]);
         let next = match number(&mut self.objects, 0x1029, 1, 0) as u8 {
