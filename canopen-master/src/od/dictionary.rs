@@ -180,8 +180,9 @@ impl<'a, H: Hooks> Dictionary<'a, H> {
         let room = room(&self.table, place, self.memory).ok_or(AbortCode::GENERAL)?;
         let (length, bytes) = room.split_at_mut(usize::from(LENGTH));
         // Until its last piece has come, it is empty.
-        let end = piece.offset as usize + piece.data.len();
-        let to = bytes.get_mut(piece.offset as usize..end).ok_or(AbortCode::TOO_LONG)?;
+        let from = piece.offset as usize;
+        let end = from.saturating_add(piece.data.len());
+        let to = bytes.get_mut(from..end).ok_or(AbortCode::TOO_LONG)?;
         to.copy_from_slice(piece.data);
         length.copy_from_slice(&if piece.last { end as u16 } else { 0 }.to_le_bytes());
         if piece.last {

@@ -180,7 +180,7 @@ impl Buffer for alloc::vec::Vec<u8> {
 
     #[inline]
     fn write(&mut self, offset: u32, data: &[u8]) -> Result<(), AbortCode> {
-        if offset as usize > MOST {
+        if (offset as usize).saturating_add(data.len()) > MOST {
             return Err(AbortCode::OUT_OF_MEMORY);
         }
         self.truncate(offset as usize);
@@ -295,5 +295,21 @@ impl<A: Buffer, B: Buffer> Buffer for Either<A, B> {
             Self::Left(buffer) => buffer.read(offset, out),
             Self::Right(buffer) => buffer.read(offset, out),
         }
+    }
+}
+
+#[cfg(all(test, feature = "alloc"))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_vector_takes_no_byte_too_many() {
+        let mut vec = alloc::vec::Vec::new();
+        let end = MOST as u32;
+        for offset in [end - 6, end, u32::MAX] {
+            assert_eq!(Buffer::write(&mut vec, offset, &[0; 7]), Err(AbortCode::OUT_OF_MEMORY));
+        }
+        assert_eq!(Buffer::write(&mut vec, end - 7, &[0; 7]), Ok(()));
+        assert_eq!(vec.begin(Some(end + 1)), Err(AbortCode::OUT_OF_MEMORY));
     }
 }
