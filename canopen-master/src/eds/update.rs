@@ -28,8 +28,9 @@ pub(crate) fn update(text: &str, before: &Device, after: &Device, whole: Whole) 
     let document = Document::parse(text);
     let end = if text.contains("\r\n") { "\r\n" } else { "\n" };
     let before = by_name(sections(before));
-    let order: Vec<String> = sections(after).iter().map(|section| canonical(&section.name)).collect();
-    let after = by_name(sections(after));
+    let after = sections(after);
+    let order: Vec<String> = after.iter().map(|section| canonical(&section.name)).collect();
+    let after = by_name(after);
     let changed = changed(&before, &after);
     let whole = match whole {
         Whole::ListsDiffer => with_other_lists(&document, &before, &changed),
@@ -193,12 +194,7 @@ fn canonical(name: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::super::model::{Entry, Object};
-    use super::super::read;
-
-    const DCF: &str = "; made by hand\n[DeviceInfo]\nVendorName = Ä # kept\n\n[OptionalObjects]\nSupportedObjects=2\n\
-        1=0x1A00\n2=0x1017 ; odd order\n[1017]\nParameterName=Heartbeat\nObjectType=7\nDataType=6\n\
-        AccessType=RW\nDefaultValue= 0\n; after\n[1A00]\nParameterName=Map\nObjectType=0x8\nDataType=0x7\n\
-        AccessType=rw\nCompactSubObj=2\n[1A00Value]\nNrOfEntries=1\n2=0x60410010\n";
+    use super::super::{DCF, read};
 
     #[test]
     fn an_unchanged_device_leaves_the_text_as_it_is() {

@@ -327,13 +327,8 @@ fn with_other(mut pairs: Vec<(String, String)>, entry: &Entry) -> Fields {
 
 #[cfg(test)]
 mod tests {
-    use super::super::read;
+    use super::super::{DCF, read};
     use super::*;
-
-    const DCF: &str = "; made by hand\n[DeviceInfo]\nVendorName = Ä # kept\n\n[OptionalObjects]\nSupportedObjects=2\n\
-        1=0x1A00\n2=0x1017 ; odd order\n[1017]\nParameterName=Heartbeat\nObjectType=7\nDataType=6\n\
-        AccessType=RW\nDefaultValue= 0\n; after\n[1A00]\nParameterName=Map\nObjectType=0x8\nDataType=0x7\n\
-        AccessType=rw\nCompactSubObj=2\n[1A00Value]\nNrOfEntries=1\n2=0x60410010\n";
 
     #[test]
     fn written_anew_it_says_the_same() {
