@@ -305,7 +305,7 @@ impl<const N: usize> Producer<N> {
 
     /// Forgets the history and what waits; the inhibit time goes on.
     pub const fn clear(&mut self) {
-        self.known = 0;
+        self.clear_history();
         self.len = 0;
     }
 

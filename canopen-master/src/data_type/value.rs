@@ -4,6 +4,7 @@ use core::fmt;
 
 use super::scalar::exactly;
 use super::{DataType, Kind, LengthError, Scalar, TimeOfDay};
+use crate::sdo::message::load;
 
 /// A value of any type of CiA 301, borrowed where it has no fixed length.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -112,7 +113,7 @@ fn integer(data_type: DataType, len: u8, bytes: &[u8]) -> Result<u64, LengthErro
     if bytes.len() != usize::from(len) {
         return Err(LengthError { data_type, expected: len, found: bytes.len() });
     }
-    Ok(bytes.iter().rev().fold(0, |value, &byte| value << 8 | u64::from(byte)))
+    Ok(load(bytes))
 }
 
 fn put_unsigned(data_type: DataType, len: u8, value: u64, out: &mut [u8]) -> Result<usize, ValueError> {

@@ -5,6 +5,7 @@ use pdo::Address;
 use super::entry::LENGTH;
 use super::{Entry, Hooks, Initial, Place, ProcessData, Stored, View};
 use crate::data_type::{DataType, Scalar};
+use crate::sdo::message::load;
 use crate::sdo::{AbortCode, Access, Piece, Small, Total, read_slice};
 
 /// The memory given for the values is too small.
@@ -200,7 +201,7 @@ impl<H: Hooks> ProcessData for Dictionary<'_, H> {
 
     fn bits(&self, at: Address) -> u64 {
         let value = self.place(at).ok().and_then(|place| self.scalar(place)).unwrap_or_default();
-        value.as_slice().iter().rev().fold(0, |bits, &byte| bits << 8 | u64::from(byte))
+        load(value.as_slice())
     }
 
     /// Within its limits, and unless the application vetoes it.

@@ -4,6 +4,7 @@ use pdo::Address;
 
 use crate::data_type::{DataType, Kind};
 use crate::sdo::AbortCode;
+use crate::sdo::message::load;
 
 /// Who may do what with an entry (CiA 301, 7.4.3, "access").
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -62,7 +63,7 @@ impl Limits {
     /// # Errors
     /// [`AbortCode::TOO_HIGH`], [`AbortCode::TOO_LOW`].
     pub fn check(&self, data_type: DataType, value: &[u8]) -> Result<(), AbortCode> {
-        let bits = value.iter().rev().fold(0u64, |bits, &byte| bits << 8 | u64::from(byte));
+        let bits = load(value);
         let number = match data_type.kind() {
             Kind::Signed(_) => {
                 let unused = 64 - 8 * value.len().clamp(1, 8);

@@ -1,13 +1,11 @@
 //! A dictionary and PDOs as one: what an SDO client sees, and what a slave works on.
 
-use core::time::Duration;
-
-use pdo::{Address, Frame, Handled, RpdoFault};
+use pdo::Address;
 
 use super::pdos::{Parameter, Pdos};
 use crate::data_type::DataType;
+use crate::sdo::message::load;
 use crate::sdo::{AbortCode, Access, Piece, Total, read_slice};
-use crate::slave;
 
 /// The objects that PDOs carry: a dictionary's part in [`Pdos`].
 pub trait ProcessData {
@@ -39,10 +37,7 @@ impl<D: Access + ProcessData, const R: usize, const T: usize, const M: usize> Ac
     fn read(&mut self, at: Address, offset: u32, out: &mut [u8]) -> Result<(usize, Total), AbortCode> {
         match Parameter::of(at) {
             None => self.dictionary.read(at, offset, out),
-            Some(parameter) => {
-                let (value, size) = self.pdos.read(parameter)?;
-                Ok(read_slice(value.to_le_bytes().get(..size).unwrap_or(&[]), offset, out))
-            }
+            Some(_) => Ok(read_slice(self.pdos.parameter(at)?.as_slice(), offset, out)),
         }
     }
 
@@ -56,47 +51,11 @@ impl<D: Access + ProcessData, const R: usize, const T: usize, const M: usize> Ac
     fn write(&mut self, at: Address, piece: &Piece<'_>) -> Result<(), AbortCode> {
         let Some(parameter) = Parameter::of(at) else { return self.dictionary.write(at, piece) };
         let (_, size) = self.pdos.read(parameter)?;
-        let value = piece.exactly(size)?.iter().rev().fold(0, |value, &byte| value << 8 | u32::from(byte));
+        let value = load(piece.exactly(size)?) as u32;
         self.pdos.write(parameter, value, &self.dictionary)
     }
 
     fn abandon(&mut self, at: Address) {
         self.dictionary.abandon(at);
-    }
-}
-
-impl<D: Access + ProcessData, const R: usize, const T: usize, const M: usize> slave::Objects
-    for Objects<D, R, T, M>
-{
-    fn start(&mut self, _now: Duration) {
-        self.pdos.start();
-    }
-
-    fn stop(&mut self) {
-        self.pdos.stop();
-    }
-
-    fn handle_frame(&mut self, now: Duration, frame: &Frame) -> Handled {
-        self.pdos.handle_frame(now, frame)
-    }
-
-    fn handle_sync(&mut self, counter: Option<u8>) {
-        self.pdos.handle_sync(counter, &self.dictionary);
-    }
-
-    fn handle_timeout(&mut self, now: Duration) {
-        self.pdos.handle_timeout(now);
-    }
-
-    fn poll_transmit(&mut self, now: Duration) -> Option<Frame> {
-        self.pdos.poll_transmit(now, &self.dictionary)
-    }
-
-    fn poll_event(&mut self) -> Option<(usize, Result<(), RpdoFault>)> {
-        self.pdos.poll_event(&mut self.dictionary)
-    }
-
-    fn poll_timeout(&self) -> Option<Duration> {
-        self.pdos.poll_timeout()
     }
 }

@@ -4,6 +4,7 @@ use core::time::Duration;
 
 use pdo::{Frame, Handled, RpdoFault};
 
+use crate::od::{self, ProcessData};
 use crate::sdo::Access;
 
 /// The objects of a [`Slave`](super::Slave): a dictionary that an SDO server can serve and, if there
@@ -47,5 +48,41 @@ pub trait Objects: Access {
     /// When to call [`handle_timeout`](Self::handle_timeout).
     fn poll_timeout(&self) -> Option<Duration> {
         None
+    }
+}
+
+impl<D: Access + ProcessData, const R: usize, const T: usize, const M: usize> Objects
+    for od::Objects<D, R, T, M>
+{
+    fn start(&mut self, _now: Duration) {
+        self.pdos.start();
+    }
+
+    fn stop(&mut self) {
+        self.pdos.stop();
+    }
+
+    fn handle_frame(&mut self, now: Duration, frame: &Frame) -> Handled {
+        self.pdos.handle_frame(now, frame)
+    }
+
+    fn handle_sync(&mut self, counter: Option<u8>) {
+        self.pdos.handle_sync(counter, &self.dictionary);
+    }
+
+    fn handle_timeout(&mut self, now: Duration) {
+        self.pdos.handle_timeout(now);
+    }
+
+    fn poll_transmit(&mut self, now: Duration) -> Option<Frame> {
+        self.pdos.poll_transmit(now, &self.dictionary)
+    }
+
+    fn poll_event(&mut self) -> Option<(usize, Result<(), RpdoFault>)> {
+        self.pdos.poll_event(&mut self.dictionary)
+    }
+
+    fn poll_timeout(&self) -> Option<Duration> {
+        self.pdos.poll_timeout()
     }
 }
