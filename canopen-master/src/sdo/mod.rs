@@ -27,6 +27,9 @@ pub use client::{ANSWER, Block, Client, Fault, Finished, Options, Outcome, Refus
 pub use pdo::Address;
 pub use server::{Access, NEXT_REQUEST, Piece, Server, Total, read_slice};
 
+/// What an abort names whose sender cannot tell the object: 0000h:00.
+pub(crate) const UNNAMED: Address = Address::new(0, 0);
+
 /// The two identifiers of an SDO connection (11 bits).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Channel {

@@ -10,7 +10,7 @@ use pdo::{Frame, Handled};
 
 use super::block::{Receiver, Sender};
 use super::message::{ABORT, Content, Request, Response, SEGMENT};
-use super::{AbortCode, Address, Buffer, Channel, data_on};
+use super::{AbortCode, Address, Buffer, Channel, UNNAMED, data_on};
 use crate::clock::{after, is_due};
 pub use block::Block;
 pub use outcome::{Fault, Finished, Outcome, Refused, SubmitError, Ticket};
@@ -440,7 +440,7 @@ impl<B: Buffer> Client<B> {
     /// An abort of another object is late while ours begins; later on, devices that abort without
     /// naming the object (0000h:00) are understood.
     fn on_abort(&mut self, at: Address, code: AbortCode, data: &[u8]) {
-        let unnamed = at == Address::new(0, 0) && !self.is_beginning();
+        let unnamed = at == UNNAMED && !self.is_beginning();
         if at == self.at || unnamed {
             self.fail(Outcome::Aborted(code));
         } else {

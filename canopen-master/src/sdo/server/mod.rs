@@ -10,7 +10,7 @@ use pdo::{Frame, Handled};
 
 use super::block::{MAX_BLOCK_SIZE, Receiver, Sender, is_block_size};
 use super::message::{Request, Response, first};
-use super::{AbortCode, Address, Channel, data_on};
+use super::{AbortCode, Address, Channel, UNNAMED, data_on};
 use crate::clock::{after, is_due};
 pub use access::{Access, Piece, Total, read_slice};
 
@@ -264,7 +264,7 @@ impl Server {
     /// object could hit the next transfer.
     fn name_nothing_if_idle(&mut self) {
         if self.is_idle() {
-            self.at = Address::new(0, 0);
+            self.at = UNNAMED;
         }
     }
 

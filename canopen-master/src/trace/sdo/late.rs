@@ -2,9 +2,10 @@
 
 use core::time::Duration;
 
-use pdo::{Address, NodeId};
+use pdo::NodeId;
 
 use super::{Content, Direction, Mode, Open, Phase, Way};
+use crate::sdo::UNNAMED;
 use crate::sdo::message::{self, Request, Response};
 
 /// So many frames one way, numbered one after the other, are segments of a block transfer: what begins a
@@ -55,7 +56,6 @@ pub(super) fn open(
 ) -> Option<Open> {
     use Direction::{Download, Upload};
     let segments = |toggle, asked| Phase::Segments { toggle, asked, last: false };
-    let unnamed = Address::new(0, 0);
     let (at, direction, mode, phase) = match *content {
         Content::Response(Response::InitiateUpload { at, content: message::Content::Segmented(_) }) => {
             (at, Upload, Mode::Segmented, Phase::Initiate)
@@ -67,30 +67,30 @@ pub(super) fn open(
             (at, Download, Mode::Block, Phase::Initiate)
         }
         Content::Request(Request::UploadSegment { toggle }) => {
-            (unnamed, Upload, Mode::Segmented, segments(toggle, false))
+            (UNNAMED, Upload, Mode::Segmented, segments(toggle, false))
         }
         Content::Response(Response::UploadSegment { toggle, .. }) => {
-            (unnamed, Upload, Mode::Segmented, segments(toggle, true))
+            (UNNAMED, Upload, Mode::Segmented, segments(toggle, true))
         }
         Content::Request(Request::DownloadSegment { toggle, .. }) => {
-            (unnamed, Download, Mode::Segmented, segments(toggle, false))
+            (UNNAMED, Download, Mode::Segmented, segments(toggle, false))
         }
         Content::Response(Response::DownloadSegment { toggle }) => {
-            (unnamed, Download, Mode::Segmented, segments(toggle, true))
+            (UNNAMED, Download, Mode::Segmented, segments(toggle, true))
         }
-        Content::Request(Request::StartBlockUpload) => (unnamed, Upload, Mode::Block, Phase::BlockStart),
-        Content::Request(Request::AckBlockUpload { .. }) => (unnamed, Upload, Mode::Block, Phase::BlockData),
-        Content::Response(Response::EndBlockUpload { .. }) => (unnamed, Upload, Mode::Block, Phase::BlockEnd),
-        Content::Request(Request::EndBlockUpload) => (unnamed, Upload, Mode::Block, Phase::BlockEnding),
+        Content::Request(Request::StartBlockUpload) => (UNNAMED, Upload, Mode::Block, Phase::BlockStart),
+        Content::Request(Request::AckBlockUpload { .. }) => (UNNAMED, Upload, Mode::Block, Phase::BlockData),
+        Content::Response(Response::EndBlockUpload { .. }) => (UNNAMED, Upload, Mode::Block, Phase::BlockEnd),
+        Content::Request(Request::EndBlockUpload) => (UNNAMED, Upload, Mode::Block, Phase::BlockEnding),
         Content::Response(Response::AckBlockDownload { .. }) => {
-            (unnamed, Download, Mode::Block, Phase::BlockData)
+            (UNNAMED, Download, Mode::Block, Phase::BlockData)
         }
         Content::Request(Request::EndBlockDownload { .. }) => {
-            (unnamed, Download, Mode::Block, Phase::BlockEnd)
+            (UNNAMED, Download, Mode::Block, Phase::BlockEnd)
         }
-        Content::Response(Response::EndBlockDownload) => (unnamed, Download, Mode::Block, Phase::BlockEnding),
-        Content::Segment(_) if way == Way::Request => (unnamed, Download, Mode::Block, Phase::BlockData),
-        Content::Segment(_) => (unnamed, Upload, Mode::Block, Phase::BlockData),
+        Content::Response(Response::EndBlockDownload) => (UNNAMED, Download, Mode::Block, Phase::BlockEnding),
+        Content::Segment(_) if way == Way::Request => (UNNAMED, Download, Mode::Block, Phase::BlockData),
+        Content::Segment(_) => (UNNAMED, Upload, Mode::Block, Phase::BlockData),
         _ => return None,
     };
     let mut open = Open::new(bus, node, (at, direction, mode), phase, now);

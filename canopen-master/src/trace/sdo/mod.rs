@@ -10,8 +10,8 @@ use core::time::Duration;
 
 use pdo::{Address, NodeId};
 
-use crate::sdo::AbortCode;
 use crate::sdo::message::{BlockSegment, Request, Response, SEGMENT};
+use crate::sdo::{AbortCode, UNNAMED};
 use late::Lead;
 use step::{Step, address, initiates, step};
 
@@ -302,8 +302,7 @@ impl Watch {
             // A segment may have looked like the beginning of a transfer: that one never was.
             self.open = late::open(bus, self.node, way, &content, now).map(Box::new);
         }
-        let nobody = Address::new(0, 0);
-        let known = self.open.as_ref().map(|open| open.transfer.at).filter(|at| *at != nobody);
+        let known = self.open.as_ref().map(|open| open.transfer.at).filter(|at| *at != UNNAMED);
         let belongs = match self.open.as_mut() {
             Some(open) => step(open, &content),
             None => Step::Foreign,

@@ -3,8 +3,8 @@
 use pdo::Address;
 
 use super::{Content, Direction, Mode, Open, Outcome, Phase, Way};
-use crate::sdo::AbortCode;
 use crate::sdo::message::{self, Request, Response};
+use crate::sdo::{AbortCode, UNNAMED};
 
 /// The transfer that a request begins.
 pub(super) const fn initiates(request: &Request) -> Option<(Address, Direction, Mode)> {
@@ -71,11 +71,10 @@ pub(super) fn step(open: &mut Open, content: &Content) -> Step {
 
 /// An abort ends the transfer of its object. Servers that cannot tell the object say 0000h:00.
 fn aborted(open: &mut Open, at: Address, by: Way, code: AbortCode) -> Step {
-    let nobody = Address::new(0, 0);
-    if open.transfer.late && open.transfer.at == nobody {
+    if open.transfer.late && open.transfer.at == UNNAMED {
         open.transfer.at = at;
     }
-    if at == open.transfer.at || at == nobody {
+    if at == open.transfer.at || at == UNNAMED {
         Step::Ended(Outcome::Aborted { by, code })
     } else {
         Step::Foreign
