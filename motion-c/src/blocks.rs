@@ -224,7 +224,9 @@ pub unsafe extern "C" fn motion_move_relative(
     })
 }
 
-/// Moves the axis with a velocity, user measuring units per second, backward < 0, until another order.
+/// Moves the axis with a velocity, user measuring units per second, backward < 0, until another order; not 0.
+/// `in_velocity` tells that it is reached. In mode Signals only the direction counts; fast if `[858]`
+/// allows it.
 ///
 /// # Safety
 /// `block` is from `motion_block_new`; `plc` is what the application was called with.
@@ -315,7 +317,8 @@ pub unsafe extern "C" fn motion_set_position(
 }
 
 /// Gears the axis to actual value input `master`, 1…6, numerator/denominator of its units (neither is 0; < 0 is
-/// backward), until another order. `in_velocity` tells that it is in gear; a failure of the master stops it.
+/// backward), until another order; only in mode Control, else an error. `in_velocity` tells that it is in gear; a
+/// failure of the master stops it.
 ///
 /// # Safety
 /// `block` is from `motion_block_new`; `plc` is what the application was called with.

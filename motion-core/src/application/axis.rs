@@ -69,9 +69,9 @@ pub enum Order {
         /// As with `MoveAbsolute`.
         velocity: Option<u32>,
     },
-    /// With a velocity, without an end.
+    /// With a velocity, without an end; in mode Signals only its direction counts.
     MoveVelocity {
-        /// User measuring units per second, backward < 0.
+        /// User measuring units per second, backward < 0; not 0.
         velocity: i32,
     },
     /// By hand, with the velocities of `[756]`…`[774]`.
@@ -83,7 +83,8 @@ pub enum Order {
     },
     /// Automatic calibration, `[792]`…`[810]`.
     Home,
-    /// Along with an actual value input, numerator/denominator of its units; in mode Control only.
+    /// Along with an actual value input, numerator/denominator of its units; only in mode Control, else
+    /// [`MotionError::NOT_CONFIGURED`].
     GearIn {
         /// Actual value input, 1…6; of type Virtual2 (6.6.1.5) it takes over another input or axis.
         master: u8,

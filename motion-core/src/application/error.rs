@@ -31,7 +31,7 @@ impl MotionError {
     /// A `Stop` is held.
     pub const STOPPING: Self = Self(0x104);
     /// A parameter that the order needs is not set: V max. `[642]`, t max. acceleration `[654]`, the
-    /// velocity, or Auto calibration `[804]`.
+    /// velocity, Auto calibration `[804]`, or mode Control `[600]` for `GearIn`.
     pub const NOT_CONFIGURED: Self = Self(0x105);
     /// A value of the order is out of range.
     pub const RANGE: Self = Self(0x106);

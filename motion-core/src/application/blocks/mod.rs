@@ -160,9 +160,10 @@ order_block! {
 
 order_block! {
     /// Moves an axis with a velocity until another order comes: the block stays busy. `in_velocity` means
-    /// that it is reached.
+    /// that it is reached. In mode Signals only the direction counts; fast if `[858]` allows it.
     MoveVelocity {
-        /// User measuring units per second, backward < 0.
+        /// User measuring units per second, backward < 0; not 0 (`NOT_CONFIGURED`), at most V max. `[642]`
+        /// (`RANGE`).
         velocity: i32
     } => |block| Order::MoveVelocity { velocity: block.velocity }
 }
@@ -175,7 +176,8 @@ order_block! {
 order_block! {
     /// Gears an axis to an actual value input until another order comes: the block stays busy. `in_velocity`
     /// means that it is in gear; from then on the way of the axis is that of the master times
-    /// numerator/denominator, to the unit.
+    /// numerator/denominator, to the unit. Only in mode Control, else `NOT_CONFIGURED`; a change of the mode
+    /// `[600]` brings the axis to standstill.
     ///
     /// The axis gets there within its working acceleration and jerk; what the master has gone meanwhile is
     /// not made up for. The master is any input: an encoder, or with type Virtual2 another input or axis,
