@@ -5,11 +5,10 @@ use super::signals::{self, Wanted};
 use super::{Axis, Brake, Home, Motion, ramps, rounded};
 use crate::application::Progress;
 use crate::control::AxisOutput;
-use crate::input::ActualValue;
 use crate::trajectory::{self, Goal};
 
 impl Axis {
-    pub(super) fn run(&mut self, inputs: &[ActualValue; 6], output: &mut AxisOutput) {
+    pub(super) fn run(&mut self, output: &mut AxisOutput) {
         self.move_brake();
         let opening = matches!(self.brake, Brake::Opening(_));
         if !self.powered {
@@ -19,7 +18,7 @@ impl Axis {
         }
         match self.settings.mode {
             Mode::None => {}
-            Mode::Control => self.run_controlled(opening, inputs, output),
+            Mode::Control => self.run_controlled(opening, output),
             Mode::Ramps => self.run_ramps(opening, output),
             Mode::Signals => self.run_signals(opening, output),
         }
@@ -57,7 +56,7 @@ impl Axis {
     /// Set values with feedback: v = v_d + KSP · (s_d − s_act) (decision 19). s_d is that of the moment
     /// at which the actual position was read; v_d the mean until the next one, so that a drive which does
     /// what it is told is where it should be then.
-    fn run_controlled(&mut self, opening: bool, inputs: &[ActualValue; 6], output: &mut AxisOutput) {
+    fn run_controlled(&mut self, opening: bool, output: &mut AxisOutput) {
         let feeds_back = self.feeds_back();
         let rests = self.motion == Motion::Idle && self.nominal.is_none();
         if !feeds_back && (rests || !self.controlled) {
@@ -67,10 +66,9 @@ impl Axis {
         self.set = self.generator.state().position;
         let mut velocity = feedback;
         if opening {
-            self.wait_for_brake(inputs);
+            self.wait_for_brake();
         } else {
-            let time = f64::from(self.cycle) / 1000.0;
-            velocity += self.advance(time, inputs) / time;
+            velocity += self.advance() / self.seconds();
         }
         self.velocity = velocity.clamp(-self.settings.maximum, self.settings.maximum);
         if self.generator.arrived() {
@@ -124,7 +122,7 @@ impl Axis {
             self.velocity = 0.0;
             return;
         }
-        let time = f64::from(self.cycle) / 1000.0;
+        let time = self.seconds();
         let target = match self.motion {
             Motion::Position { target, velocity } => Some((target, velocity)),
             Motion::Idle if self.settings.control_in_position || matches!(self.brake, Brake::Closing(_)) => {

@@ -14,63 +14,61 @@ use crate::failure::READING_LOST;
 use crate::input::{ActualValue, Reading};
 use crate::trajectory::{Goal, Limits, State};
 
-/// What an axis is geared to, and how far it has come.
+/// What an axis is geared to, and what the master does in this cycle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Gear {
     /// Actual value input, 1…6.
     master: u8,
     numerator: i32,
     denominator: u32,
-    /// The master's position up to which the axis has gone along.
-    last: i32,
-    /// What is left of its way, in parts of a unit by `denominator`.
+    /// The master's position in this cycle.
+    position: i32,
+    /// The master's way to there, times the numerator; its calibration is none.
+    way: i64,
+    /// What failed of the master; to go on without it is to go blindly.
+    failure: Option<Failure>,
+    /// What is left of the axis' way, in parts of a unit by `denominator`.
     rest: u32,
-    /// The master's velocity over the last cycle times the ratio, units/s.
+    /// The axis' velocity by the way that it has gone along last, units/s.
     velocity: f64,
 }
 
 impl Gear {
-    fn master(&self, inputs: &[ActualValue; 6]) -> ActualValue {
-        let place = usize::from(self.master).checked_sub(1);
-        place.and_then(|place| inputs.get(place)).copied().unwrap_or_default()
-    }
-
     /// Begins with what the master does in this cycle of `time` seconds.
-    fn begin(&mut self, inputs: &[ActualValue; 6], time: f64) {
-        let master = self.master(inputs);
-        let way = libm::round(f64::from(master.velocity) * time) as i32;
-        (self.last, self.rest) = (master.position.wrapping_sub(master.shift).wrapping_sub(way), 0);
-        self.velocity = self.velocity_now(inputs, time);
+    fn new((master, numerator, denominator): (u8, i32, u32), inputs: &[ActualValue; 6], time: f64) -> Self {
+        let value = value(master, inputs);
+        let way = libm::round(f64::from(value.velocity) * time) as i32;
+        let position = value.position.wrapping_sub(value.shift).wrapping_sub(way);
+        let (failure, rest, velocity) = (None, 0, 0.0);
+        let mut gear = Self { master, numerator, denominator, position, way: 0, failure, rest, velocity };
+        gear.look(inputs);
+        gear.velocity = gear.velocity_now(time);
+        gear
     }
 
-    /// The master's way that the axis has not gone along, times the numerator; its calibration is none.
-    fn way(&self, inputs: &[ActualValue; 6]) -> i64 {
-        let master = self.master(inputs);
-        let moved = master.position.wrapping_sub(self.last).wrapping_sub(master.shift);
-        i64::from(moved) * i64::from(self.numerator)
+    /// Looks at the master: once a cycle.
+    fn look(&mut self, inputs: &[ActualValue; 6]) {
+        let master = value(self.master, inputs);
+        let moved = master.position.wrapping_sub(self.position).wrapping_sub(master.shift);
+        self.position = master.position;
+        self.way = i64::from(moved) * i64::from(self.numerator);
+        let lost = matches!(master.reading, Reading::None | Reading::Lost);
+        self.failure = master.failure.or_else(|| lost.then_some(READING_LOST));
     }
 
     /// Velocity by what the master does in this cycle, units/s.
-    fn velocity_now(&self, inputs: &[ActualValue; 6], time: f64) -> f64 {
-        self.way(inputs) as f64 / f64::from(self.denominator) / time
+    fn velocity_now(&self, time: f64) -> f64 {
+        self.way as f64 / f64::from(self.denominator) / time
     }
 
     /// Goes along: the whole units that the axis goes.
-    fn follow(&mut self, inputs: &[ActualValue; 6], time: f64) -> f64 {
-        self.velocity = self.velocity_now(inputs, time);
+    fn follow(&mut self, time: f64) -> f64 {
+        self.velocity = self.velocity_now(time);
         let denominator = i64::from(self.denominator);
         // At most 2^62 + 2^32.
-        let way = i64::from(self.rest) + self.way(inputs);
-        self.last = self.master(inputs).position;
+        let way = i64::from(self.rest) + self.way;
         self.rest = way.rem_euclid(denominator) as u32;
         way.div_euclid(denominator) as f64
-    }
-
-    /// What failed of the master; to go on without it is to go blindly.
-    fn failure(&self, inputs: &[ActualValue; 6]) -> Option<Failure> {
-        let master = self.master(inputs);
-        let lost = matches!(master.reading, Reading::None | Reading::Lost);
-        master.failure.or_else(|| lost.then_some(READING_LOST))
     }
 
     /// Velocity that the axis has by it, units/s.
@@ -79,7 +77,19 @@ impl Gear {
     }
 }
 
+/// The value of an input, 1…6.
+fn value(input: u8, inputs: &[ActualValue; 6]) -> ActualValue {
+    let place = usize::from(input).checked_sub(1);
+    place.and_then(|place| inputs.get(place)).copied().unwrap_or_default()
+}
+
 impl Axis {
+    pub(super) fn look_at_master(&mut self, inputs: &[ActualValue; 6]) {
+        if let Motion::Gear(gear) = &mut self.motion {
+            gear.look(inputs);
+        }
+    }
+
     pub(super) fn begin_gear(
         &mut self,
         (master, numerator, denominator): (u8, i32, u32),
@@ -90,11 +100,10 @@ impl Axis {
         if !(1..=6).contains(&master) || itself || numerator == 0 || denominator == 0 {
             return Err(MotionError::RANGE);
         }
-        let mut gear = Gear { master, numerator, denominator, last: 0, rest: 0, velocity: 0.0 };
-        if let Some(failure) = gear.failure(inputs) {
+        let gear = Gear::new((master, numerator, denominator), inputs, self.seconds());
+        if let Some(failure) = gear.failure {
             return Err(MotionError::from_failure(failure));
         }
-        gear.begin(inputs, self.seconds());
         if gear.velocity.abs() > self.settings.maximum {
             return Err(MotionError::RANGE);
         }
@@ -112,16 +121,11 @@ impl Axis {
         self.settings.limits.filter(|_| self.settings.mode == Mode::Control)
     }
 
-    /// Length of a cycle, s.
-    fn seconds(&self) -> f64 {
-        f64::from(self.cycle) / 1000.0
-    }
-
     /// Velocity that the set values are about to have, units/s.
-    pub(super) fn velocity_now(&self, inputs: &[ActualValue; 6]) -> f64 {
+    pub(super) fn velocity_now(&self) -> f64 {
         let own = self.generator.state().velocity;
         let Motion::Gear(gear) = self.motion else { return own };
-        own + gear.velocity_now(inputs, self.seconds())
+        own + gear.velocity_now(self.seconds())
     }
 
     /// The generator's way is relative to the master from here on.
@@ -162,11 +166,12 @@ impl Axis {
         Ok(())
     }
 
-    /// The set values' way in a cycle of `time` seconds, units.
-    pub(super) fn advance(&mut self, time: f64, inputs: &[ActualValue; 6]) -> f64 {
+    /// The set values' way in this cycle, units.
+    pub(super) fn advance(&mut self) -> f64 {
+        let time = self.seconds();
         let own = self.generator.step(time).position - self.set;
         let Motion::Gear(gear) = &mut self.motion else { return own };
-        let way = gear.follow(inputs, time);
+        let way = gear.follow(time);
         // What is told to the drive is not rounded to units.
         let told = own + gear.velocity * time;
         self.generator.shift(way);
@@ -174,10 +179,9 @@ impl Axis {
     }
 
     /// Until the brake is open the axis stands, and the master goes on.
-    pub(super) fn wait_for_brake(&mut self, inputs: &[ActualValue; 6]) {
+    pub(super) fn wait_for_brake(&mut self) {
         if let (Motion::Gear(mut gear), Some(limits)) = (self.motion, self.settings.limits) {
-            gear.begin(inputs, self.seconds());
-            gear.last = gear.master(inputs).position;
+            gear.velocity = gear.velocity_now(self.seconds());
             _ = self.generator.set_state(State::at_rest(self.set));
             self.engage(&gear, limits);
             self.motion = Motion::Gear(gear);
@@ -186,13 +190,11 @@ impl Axis {
 
     /// What ends gearing by itself: the master's failure, or a master that goes faster than the axis may,
     /// which is then off its set values.
-    pub(super) fn gear_failure(&self, inputs: &[ActualValue; 6]) -> Option<Failure> {
+    pub(super) fn gear_failure(&self) -> Option<Failure> {
         let Motion::Gear(gear) = self.motion else { return None };
-        if let Some(failure) = gear.failure(inputs) {
-            return Some(failure);
-        }
         let most = self.settings.maximum;
-        match self.velocity_now(inputs) {
+        match self.velocity_now() {
+            _ if gear.failure.is_some() => gear.failure,
             _ if matches!(self.brake, Brake::Opening(_)) => None,
             velocity if velocity > most => Some(Failure::DELTA_S_MAX),
             velocity if velocity < -most => Some(Failure::DELTA_S_MIN),

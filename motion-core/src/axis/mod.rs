@@ -155,10 +155,11 @@ impl AxisControl for Axis {
     fn cycle(&mut self, input: &AxisInput, inputs: &[ActualValue; 6]) -> AxisOutput {
         let mut output = AxisOutput::default();
         self.measure(input);
+        self.look_at_master(inputs);
         self.power(input, &mut output);
         self.watch_drive(input.failure, &mut output);
         if self.powered {
-            self.watch(input, inputs, &mut output);
+            self.watch(input, &mut output);
             if input.reset && input.failure.is_none() && input.actual.reading == Reading::Real {
                 self.acknowledge();
             }
@@ -171,13 +172,18 @@ impl AxisControl for Axis {
         }
         let turned = self.turning_side().and_then(|side| self.settings.ends.get(side));
         self.follow_home(turned.is_some_and(|end| end.switched(input.digital)), input.actual.calibrated);
-        self.run(inputs, &mut output);
+        self.run(&mut output);
         self.report(input, &mut output);
         output
     }
 }
 
 impl Axis {
+    /// Length of a cycle, s.
+    fn seconds(&self) -> f64 {
+        f64::from(self.cycle) / 1000.0
+    }
+
     fn measure(&mut self, input: &AxisInput) {
         let shift = input.actual.shift;
         if shift != 0 {

@@ -7,7 +7,7 @@ use super::{Axis, Motion};
 use crate::application::{MotionError, Progress};
 use crate::control::{AxisInput, AxisOutput, PlcStop};
 use crate::failure::{HW_LIMIT_MINUS, HW_LIMIT_PLUS, READING_LOST, SW_LIMIT_MINUS, SW_LIMIT_PLUS};
-use crate::input::{ActualValue, Reading};
+use crate::input::Reading;
 
 impl Axis {
     /// Tells a failure of the drive once, also of an axis that is not enabled.
@@ -18,7 +18,7 @@ impl Axis {
     }
 
     /// Failures of drive and input, following error, limit switches: all in the cycle in which they come.
-    pub(super) fn watch(&mut self, input: &AxisInput, inputs: &[ActualValue; 6], output: &mut AxisOutput) {
+    pub(super) fn watch(&mut self, input: &AxisInput, output: &mut AxisOutput) {
         if let Some(failure) = input.failure.or(input.actual.failure).or_else(|| self.blind(output)) {
             let error = MotionError::from_failure(failure);
             if self.motion != Motion::Failed || self.error != error {
@@ -27,7 +27,7 @@ impl Axis {
             }
             return;
         }
-        if let Some(failure) = self.gear_failure(inputs) {
+        if let Some(failure) = self.gear_failure() {
             self.fail(MotionError::from_failure(failure), output);
             output.failure = Some(failure);
             return;
@@ -48,7 +48,7 @@ impl Axis {
                 return;
             }
         }
-        self.watch_limits(input, inputs, output);
+        self.watch_limits(input, output);
     }
 
     /// Without an actual value no axis stays enabled that had one, and none moves that had none.
@@ -64,12 +64,7 @@ impl Axis {
         }
     }
 
-    pub(super) fn watch_limits(
-        &mut self,
-        input: &AxisInput,
-        inputs: &[ActualValue; 6],
-        output: &mut AxisOutput,
-    ) {
+    fn watch_limits(&mut self, input: &AxisInput, output: &mut AxisOutput) {
         let before = self.limits;
         let homing = matches!(self.motion, Motion::Home(_));
         let [upper, lower] = self.settings.ends;
@@ -94,13 +89,13 @@ impl Axis {
         let turning = self.turning_side();
         for side in 0..2 {
             let Some(&Some(failure)) = self.limits.get(side) else { continue };
-            let towards = if side == 0 { self.direction(inputs) > 0 } else { self.direction(inputs) < 0 };
+            let towards = if side == 0 { self.direction() > 0 } else { self.direction() < 0 };
             let fresh = before.get(side).copied().flatten().is_none();
             // The calibration's turning point is no failure.
             if turning == Some(side) && homing || self.motion == Motion::Failed {
                 continue;
             }
-            if towards || fresh && !self.retreats(side, inputs) {
+            if towards || fresh && !self.retreats(side) {
                 self.fail(MotionError::from_failure(failure), output);
                 output.failure = Some(failure);
             }
@@ -111,8 +106,8 @@ impl Axis {
     }
 
     /// Whether the present motion leads off a limit switch.
-    pub(super) fn retreats(&self, side: usize, inputs: &[ActualValue; 6]) -> bool {
-        if side == 0 { self.direction(inputs) < 0 } else { self.direction(inputs) > 0 }
+    pub(super) fn retreats(&self, side: usize) -> bool {
+        if side == 0 { self.direction() < 0 } else { self.direction() > 0 }
     }
 
     /// The side on which an automatic calibration turns: its hardware limit switch there is the turning
@@ -126,12 +121,11 @@ impl Axis {
     }
 
     /// Direction in which the axis is driven now.
-    pub(super) fn direction(&self, inputs: &[ActualValue; 6]) -> i8 {
+    pub(super) fn direction(&self) -> i8 {
         if self.settings.mode == Mode::Signals {
             return self.sequence.direction();
         }
-        let velocity =
-            if self.settings.mode == Mode::Ramps { self.velocity } else { self.velocity_now(inputs) };
+        let velocity = if self.settings.mode == Mode::Ramps { self.velocity } else { self.velocity_now() };
         if velocity == 0.0 {
             0
         } else if velocity > 0.0 {
