@@ -88,16 +88,11 @@ impl From<Outputs> for BlockOutputs {
     }
 }
 
-/// A null pointer, or a block of another kind: a value out of range.
-const WRONG_BLOCK: BlockOutputs = BlockOutputs {
-    done: false,
-    busy: false,
-    active: false,
-    in_velocity: false,
-    command_aborted: false,
-    error: true,
-    error_id: MotionError::RANGE.0,
-};
+impl BlockOutputs {
+    fn failed(error: MotionError) -> Self {
+        Self { error: true, error_id: error.0, ..Self::default() }
+    }
+}
 
 /// Makes a block for an axis 1…6; to be given back with `motion_block_free`. `kind` is one of
 /// `MotionBlockKind`; null for others.
@@ -154,7 +149,8 @@ macro_rules! call {
         let (block, access) = unsafe { ($block.as_mut(), plc($plc)) };
         match (block, access) {
             (Some(Block(Any::$kind($b))), Some($p)) => $body,
-            _ => WRONG_BLOCK,
+            // A null pointer, or a block of another kind.
+            _ => BlockOutputs::failed(MotionError::RANGE),
         }
     }};
 }
@@ -169,7 +165,7 @@ pub unsafe extern "C" fn motion_power(block: *mut Block, plc: *mut Plc, enable: 
         block.enable = enable;
         match block.call(plc) {
             Ok(on) => BlockOutputs { done: on == enable, busy: on != enable, ..BlockOutputs::default() },
-            Err(error) => BlockOutputs { error: true, error_id: error.0, ..BlockOutputs::default() },
+            Err(error) => BlockOutputs::failed(error),
         }
     })
 }

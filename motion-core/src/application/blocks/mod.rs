@@ -26,16 +26,8 @@ pub struct Outputs {
 }
 
 impl Outputs {
-    const fn failed(error_id: MotionError) -> Self {
-        Self {
-            done: false,
-            busy: false,
-            active: false,
-            in_velocity: false,
-            command_aborted: false,
-            error: true,
-            error_id,
-        }
+    fn failed(error_id: MotionError) -> Self {
+        Self { error: true, error_id, ..Self::default() }
     }
 
     fn of(access: &AxisAccess, ticket: Ticket) -> Self {
