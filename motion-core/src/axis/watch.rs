@@ -18,8 +18,11 @@ impl Axis {
     }
 
     /// Failures of drive and input, following error, limit switches: all in the cycle in which they come.
+    /// Without an actual value no axis stays enabled that had one, and none moves that had none.
     pub(super) fn watch(&mut self, input: &AxisInput, output: &mut AxisOutput) {
-        if let Some(failure) = input.failure.or(input.actual.failure).or_else(|| self.blind(output)) {
+        let lost = || (self.reading == Reading::Lost).then_some(READING_LOST);
+        // Told already, by who has it.
+        if let Some(failure) = input.failure.or(input.actual.failure).or_else(lost) {
             let error = MotionError::from_failure(failure);
             if self.motion != Motion::Failed || self.error != error {
                 self.controlled = false;
@@ -27,9 +30,14 @@ impl Axis {
             }
             return;
         }
+        let moves = !matches!(self.motion, Motion::Idle | Motion::Failed);
+        if self.reading == Reading::None && moves {
+            self.controlled = false;
+            self.fail_with(READING_LOST, output);
+            return;
+        }
         if let Some(failure) = self.gear_failure() {
-            self.fail(MotionError::from_failure(failure), output);
-            output.failure = Some(failure);
+            self.fail_with(failure, output);
             return;
         }
         if self.settings.mode == Mode::Control && self.feeds_back() && self.motion != Motion::Failed {
@@ -43,25 +51,11 @@ impl Axis {
                 None
             };
             if let Some(failure) = failure {
-                self.fail(MotionError::from_failure(failure), output);
-                output.failure = Some(failure);
+                self.fail_with(failure, output);
                 return;
             }
         }
         self.watch_limits(input, output);
-    }
-
-    /// Without an actual value no axis stays enabled that had one, and none moves that had none.
-    fn blind(&self, output: &mut AxisOutput) -> Option<Failure> {
-        match (self.reading, self.motion) {
-            (Reading::Lost, _) => Some(READING_LOST),
-            (Reading::None, Motion::Idle | Motion::Failed) => None,
-            (Reading::None, _) => {
-                output.failure = Some(READING_LOST);
-                output.failure
-            }
-            _ => None,
-        }
     }
 
     fn watch_limits(&mut self, input: &AxisInput, output: &mut AxisOutput) {
@@ -87,27 +81,21 @@ impl Axis {
             }
         }
         let turning = self.turning_side();
-        for side in 0..2 {
-            let Some(&Some(failure)) = self.limits.get(side) else { continue };
-            let towards = if side == 0 { self.direction() > 0 } else { self.direction() < 0 };
-            let fresh = before.get(side).copied().flatten().is_none();
+        let direction = self.direction();
+        let sides = self.limits.into_iter().zip(before).zip([direction, -direction]);
+        for (side, ((limit, before), towards)) in sides.enumerate() {
+            let Some(failure) = limit else { continue };
             // The calibration's turning point is no failure.
             if turning == Some(side) && homing || self.motion == Motion::Failed {
                 continue;
             }
-            if towards || fresh && !self.retreats(side) {
-                self.fail(MotionError::from_failure(failure), output);
-                output.failure = Some(failure);
+            if towards > 0 || before.is_none() && towards == 0 {
+                self.fail_with(failure, output);
             }
         }
         if self.limits == [None; 2] && self.error.is_limit() && self.motion != Motion::Failed {
             self.error = MotionError::NONE;
         }
-    }
-
-    /// Whether the present motion leads off a limit switch.
-    pub(super) fn retreats(&self, side: usize) -> bool {
-        if side == 0 { self.direction() < 0 } else { self.direction() > 0 }
     }
 
     /// The side on which an automatic calibration turns: its hardware limit switch there is the turning
@@ -120,22 +108,22 @@ impl Axis {
         }
     }
 
-    /// Direction in which the axis is driven now.
-    pub(super) fn direction(&self) -> i8 {
+    /// Direction in which the axis is driven now: 1, 0 or −1.
+    fn direction(&self) -> i8 {
         if self.settings.mode == Mode::Signals {
             return self.sequence.direction();
         }
         let velocity = if self.settings.mode == Mode::Ramps { self.velocity } else { self.velocity_now() };
-        if velocity == 0.0 {
-            0
-        } else if velocity > 0.0 {
-            1
-        } else {
-            -1
-        }
+        i8::from(velocity > 0.0) - i8::from(velocity < 0.0)
     }
 
-    pub(super) fn fail(&mut self, error: MotionError, output: &mut AxisOutput) {
+    /// Fails by what it tells.
+    fn fail_with(&mut self, failure: Failure, output: &mut AxisOutput) {
+        self.fail(MotionError::from_failure(failure), output);
+        output.failure = Some(failure);
+    }
+
+    fn fail(&mut self, error: MotionError, output: &mut AxisOutput) {
         if self.motion != Motion::Idle {
             output.ended = Some(Progress::Failed(error));
         }
