@@ -4,7 +4,7 @@ use super::settings::{Calibration, Mode};
 use super::signals::{self, Wanted};
 use super::{Axis, Brake, Home, Motion, ramps, rounded};
 use crate::application::Progress;
-use crate::control::AxisOutput;
+use crate::control::{ActualSource, AxisOutput};
 use crate::trajectory::{self, Goal};
 
 impl Axis {
@@ -22,7 +22,7 @@ impl Axis {
             Mode::Ramps => self.run_ramps(opening, output),
             Mode::Signals => self.run_signals(opening, output),
         }
-        if self.settings.is_virtual {
+        if self.settings.source == ActualSource::Virtual {
             let before = core::mem::replace(&mut self.actual, rounded(self.generator.state().position));
             self.wrap(before, 0);
             self.set = self.generator.state().position;
@@ -168,7 +168,7 @@ impl Axis {
 
     /// Nothing holds the position: the set values go with the axis.
     pub(super) fn follow_actual(&mut self) {
-        if !self.settings.is_virtual {
+        if self.settings.source != ActualSource::Virtual {
             let deviation = self.deviation();
             self.generator.shift(-deviation);
         }

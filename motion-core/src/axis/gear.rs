@@ -9,7 +9,8 @@ use lb2::code::Failure;
 
 use super::settings::Mode;
 use super::{Axis, Brake, Motion};
-use crate::application::MotionError;
+use crate::application::{MotionError, Progress};
+use crate::control::{ActualSource, AxisOutput};
 use crate::failure::READING_LOST;
 use crate::input::{ActualValue, Reading};
 use crate::trajectory::{Goal, Limits, State};
@@ -96,7 +97,7 @@ impl Axis {
         inputs: &[ActualValue; 6],
     ) -> Result<(), MotionError> {
         let limits = self.gear_limits().ok_or(MotionError::NOT_CONFIGURED)?;
-        let itself = self.settings.input == Some(master);
+        let itself = self.settings.source == ActualSource::from_choice(master.into());
         if !(1..=6).contains(&master) || itself || numerator == 0 || denominator == 0 {
             return Err(MotionError::RANGE);
         }
@@ -150,7 +151,7 @@ impl Axis {
     }
 
     /// Goes on with the velocity that it has, or stops where it has none.
-    pub(super) fn begin_gear_out(&mut self) -> Result<(), MotionError> {
+    pub(super) fn begin_gear_out(&mut self, output: &mut AxisOutput) -> Result<(), MotionError> {
         let (Motion::Gear(_), Some(limits)) = (self.motion, self.settings.limits) else {
             return Err(MotionError::NOT_GEARED);
         };
@@ -158,11 +159,12 @@ impl Axis {
         let most = self.settings.maximum;
         let velocity = self.generator.state().velocity.clamp(-most, most);
         self.generator.go(Goal::Velocity(velocity), limits).map_err(|_| MotionError::RANGE)?;
-        self.motion = if velocity == 0.0 {
-            Motion::Braking { stop: false }
+        if velocity == 0.0 {
+            self.motion = Motion::Braking { stop: false };
         } else {
-            Motion::Velocity { velocity, fast: false }
-        };
+            self.motion = Motion::Velocity { velocity, fast: false };
+            output.ended = Some(Progress::Done);
+        }
         Ok(())
     }
 

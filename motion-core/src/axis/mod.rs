@@ -14,7 +14,7 @@ mod signals;
 mod watch;
 
 use crate::application::{AxisStatus, MotionError, Progress, State};
-use crate::control::{AxisControl, AxisInput, AxisOutput};
+use crate::control::{ActualSource, AxisControl, AxisInput, AxisOutput};
 use crate::input::{ActualValue, Reading};
 use crate::output::{Command, Signals};
 use crate::parameters::Values;
@@ -194,7 +194,7 @@ impl Axis {
             }
         }
         let before = self.actual;
-        self.actual = if self.settings.is_virtual {
+        self.actual = if self.settings.source == ActualSource::Virtual {
             rounded(self.generator.state().position)
         } else {
             input.actual.position
@@ -248,7 +248,8 @@ impl Axis {
 
     /// Whether the position control is active.
     fn feeds_back(&self) -> bool {
-        if self.settings.mode != Mode::Control || self.settings.is_virtual || !self.powered {
+        let is_virtual = self.settings.source == ActualSource::Virtual;
+        if self.settings.mode != Mode::Control || is_virtual || !self.powered {
             return false;
         }
         match self.motion {
@@ -297,7 +298,10 @@ impl Axis {
         output.status = AxisStatus {
             state: self.state(),
             position: self.actual,
-            velocity: if self.settings.is_virtual { rounded(set_velocity) } else { input.actual.velocity },
+            velocity: match self.settings.source {
+                ActualSource::Virtual => rounded(set_velocity),
+                _ => input.actual.velocity,
+            },
             nominal_position: nominal,
             nominal_velocity: if follows { self.velocity } else { set_velocity },
             nominal_acceleration: if follows { 0.0 } else { generator.acceleration },

@@ -3,7 +3,7 @@
 use super::settings::{Calibration, JogVelocities, Mode};
 use super::{Axis, Home, Motion};
 use crate::application::{MotionError, Order, Progress};
-use crate::control::AxisOutput;
+use crate::control::{ActualSource, AxisOutput};
 use crate::failure::READING_LOST;
 use crate::input::{ActualValue, Reading};
 use crate::trajectory::Goal;
@@ -11,21 +11,21 @@ use crate::trajectory::Goal;
 impl Axis {
     /// Begins an order, or ends it as refused; a motion under way then goes on.
     pub(super) fn order(&mut self, order: Order, inputs: &[ActualValue; 6], output: &mut AxisOutput) {
-        match self.begin(order, inputs) {
-            // At a standstill it is the end of the motion.
-            Ok(()) if order == Order::GearOut && matches!(self.motion, Motion::Velocity { .. }) => {
-                output.ended = Some(Progress::Done);
-            }
-            Ok(()) => {}
-            Err(error) => output.ended = Some(Progress::Failed(error)),
+        if let Err(error) = self.begin(order, inputs, output) {
+            output.ended = Some(Progress::Failed(error));
         }
     }
 
-    fn begin(&mut self, order: Order, inputs: &[ActualValue; 6]) -> Result<(), MotionError> {
+    fn begin(
+        &mut self,
+        order: Order,
+        inputs: &[ActualValue; 6],
+        output: &mut AxisOutput,
+    ) -> Result<(), MotionError> {
         if !self.powered {
             return Err(MotionError::NOT_ENABLED);
         }
-        if self.settings.mode == Mode::None || self.settings.no_input {
+        if self.settings.mode == Mode::None || self.settings.source == ActualSource::None {
             return Err(MotionError::NOT_CONFIGURED);
         }
         if let Order::Halt | Order::Stop = order {
@@ -83,7 +83,7 @@ impl Axis {
             Order::GearIn { master, numerator, denominator } => {
                 self.begin_gear((master, numerator, denominator), inputs)
             }
-            Order::GearOut => self.begin_gear_out(),
+            Order::GearOut => self.begin_gear_out(output),
             Order::Halt | Order::Stop => Ok(()),
         }
     }

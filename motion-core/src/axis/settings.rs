@@ -1,5 +1,6 @@
 //! Settings of an axis, `[600]`…`[971]`, read from the parameters in one place.
 
+use crate::control::ActualSource;
 use crate::io::Terminal;
 use crate::parameters::Values;
 use crate::trajectory::Limits;
@@ -69,12 +70,8 @@ pub(super) struct Jogs {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Settings {
     pub(super) mode: Mode,
-    /// `[606]`: none.
-    pub(super) no_input: bool,
-    /// `[606]`: actual value input, 1…6.
-    pub(super) input: Option<u8>,
-    /// `[606]`: the actual value is the nominal value.
-    pub(super) is_virtual: bool,
+    /// `[606]`.
+    pub(super) source: ActualSource,
     /// `[642]`, user measuring units/s.
     pub(super) maximum: f64,
     /// `[684]`, or V max. where it is 0.
@@ -145,9 +142,7 @@ impl Settings {
                 3 => Mode::Ramps,
                 _ => Mode::None,
             },
-            no_input: value(606) == 0,
-            input: u8::try_from(value(606)).ok().filter(|input| (1..=6).contains(input)),
-            is_virtual: value(606) == 8,
+            source: ActualSource::from_choice(value(606)),
             maximum,
             working: if value(684) > 0 { number(684).min(maximum) } else { maximum },
             ksp: number(648) / 10.0,

@@ -17,6 +17,28 @@ pub enum PlcStop {
     Regulate,
 }
 
+/// Where an axis has its actual value from, `[606]`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum ActualSource {
+    None,
+    /// Actual value input, by place.
+    Input(u8),
+    /// The clock pulses of its own output.
+    Stepper,
+    /// The set value itself.
+    Virtual,
+}
+
+impl ActualSource {
+    pub(crate) fn from_choice(choice: i32) -> Self {
+        match choice {
+            7 => Self::Stepper,
+            8 => Self::Virtual,
+            input => u8::try_from(input - 1).map_or(Self::None, Self::Input),
+        }
+    }
+}
+
 /// What an axis is given in one cycle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AxisInput {

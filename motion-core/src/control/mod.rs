@@ -4,6 +4,7 @@
 mod axis;
 mod settings;
 
+pub(crate) use axis::ActualSource;
 pub use axis::{AxisControl, AxisInput, AxisOutput, PlcStop};
 
 use lb2::code::{Failure, StoredFailure};
@@ -17,7 +18,7 @@ use crate::io::{
 };
 use crate::output::{self, Command, DriveSetpoint, Nominal, NominalValueOutput};
 use crate::parameters::Values;
-use settings::{ActualSource, AxisRoute, Settings};
+use settings::{AxisRoute, Settings};
 
 /// Axes, actual value inputs and nominal value outputs.
 const COUNT: usize = 6;
@@ -188,7 +189,9 @@ impl<A: AxisControl> Control<A> {
             };
             let input = AxisInput {
                 actual: match route.source {
-                    ActualSource::Input(input) => self.values.get(input).copied().unwrap_or_default(),
+                    ActualSource::Input(input) => {
+                        self.values.get(usize::from(input)).copied().unwrap_or_default()
+                    }
                     ActualSource::Stepper | ActualSource::Virtual | ActualSource::None => ActualValue {
                         position: self
                             .quantities
@@ -355,7 +358,7 @@ impl<A: AxisControl> Control<A> {
 
     fn set_position(&mut self, at: usize, route: AxisRoute, position: i32) {
         if let ActualSource::Input(input) = route.source {
-            if let Some(input) = self.inputs.get_mut(input) {
+            if let Some(input) = self.inputs.get_mut(usize::from(input)) {
                 input.set_position(position);
             }
             return;

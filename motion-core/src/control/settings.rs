@@ -3,22 +3,10 @@
 
 use lb2::code::Failure;
 
-use super::axis::PlcStop;
+use super::axis::{ActualSource, PlcStop};
 use super::{COUNT, DRIVES, DriveInputs};
 use crate::parameters::Values;
 use crate::{input, output};
-
-/// Where an axis has its actual value from, `[606]`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum ActualSource {
-    None,
-    /// Actual value input, by place.
-    Input(usize),
-    /// The clock pulses of its own output.
-    Stepper,
-    /// The set value itself.
-    Virtual,
-}
 
 /// How an activated axis is connected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -33,7 +21,7 @@ pub(super) struct AxisRoute {
 impl AxisRoute {
     /// Whether its actual value is that of an input, by place.
     pub(super) fn is_on(self, input: usize) -> bool {
-        self.source == ActualSource::Input(input)
+        matches!(self.source, ActualSource::Input(own) if usize::from(own) == input)
     }
 
     /// What failed of its drives.
@@ -72,14 +60,9 @@ impl Settings {
                     output::Kind::CanBus { object, .. } => object,
                     _ => None,
                 });
-                let source = match values.at(606, at) {
-                    0 => ActualSource::None,
-                    7 => ActualSource::Stepper,
-                    8 => ActualSource::Virtual,
-                    input => place(input).map_or(ActualSource::None, ActualSource::Input),
-                };
+                let source = ActualSource::from_choice(values.at(606, at));
                 let reads = match source {
-                    ActualSource::Input(input) => match input::Settings::read(values, input).kind {
+                    ActualSource::Input(input) => match input::Settings::read(values, input.into()).kind {
                         input::Kind::Can { object } => object,
                         _ => None,
                     },
