@@ -89,7 +89,7 @@ pub(crate) enum Command {
     /// A bus, a controller or a capture on a screen that lives, or one snapshot of it
     ///
     /// Keys: q, Esc and Ctrl-C end it; Tab, Shift-Tab and 1 to 9 choose a table, the arrows, Page Up and Page
-    /// Down scroll it, z gives it the whole screen; p halts the screen. Of a capture, `.` and `,` go a frame
+    /// Down scroll it, z or Enter gives it the whole screen; p or the space bar halts the screen. Of a capture, `.` and `,` go a frame
     /// forth and back, `>` and `<` a twentieth of it, Home and End to its ends.
     Monitor(crate::monitor::cli::Monitor),
     /// EDS, DCF, XDD and XDC files

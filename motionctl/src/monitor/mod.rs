@@ -5,13 +5,14 @@
 //! JSON document. Its times are seconds; what is not known is null:
 //!
 //! - all: `source`, `story` (lines as `decode` words them);
-//! - buses: `seconds`, `bitrate`, `by_kind`; `buses` with `state`, `frames`, `error_frames`, `overruns`, and `now` (the last
-//!   second), `mean` and `peak` of `frames_per_second`, `bits_per_second`, `load_percent`; `nodes` with `state`,
-//!   `drive`, `name`, `identity`, `error_control` (`kind`, `period`, `age`, `missed`, `silent`), `emergency`,
-//!   `sdo`; `repeating` with `what`, `count`, `period`, `shortest`, `longest`, `age`, `changes`, `data`, `values`;
-//!   of a capture `frames` and `damaged`;
-//! - a controller: `seconds`, `answers`, `identity`, `failures`, `axes_activated`, `plc`, `axes`, `can`, and what was asked
-//!   for: `parameters`, `ram`;
+//! - buses: `seconds`, `bitrate`, `by_kind`; `buses` with `bus`, `state`, `frames`, `error_frames`, `overruns`,
+//!   and `now` (the last second), `mean` and `peak` of `frames_per_second`, `bits_per_second`, `load_percent`;
+//!   `nodes` with `bus`, `node`, `state`, `drive`, `device_type`, `profile`, `name`, `identity`, `frames`, `age`,
+//!   `error_control` (`kind`, `period`, `age`, `missed`, `silent`), `toggle_errors`, `boot_ups`, `emergencies`,
+//!   `emergency`, `sdo`; `repeating` with `bus`, `what`, `count`, `period`, `shortest`, `longest`, `age`,
+//!   `changes`, `data`, `values`; of a capture `frames` and `damaged`;
+//! - a controller: `seconds`, `answers`, `identity`, `failures`, `axes_activated`, `plc`, `axes`, `can`, and what
+//!   was asked for: `parameters`, `ram`;
 //! - a capture of an LB2 line: `telegrams`, `discarded_bytes`, `functions`, `errors`, `parameters`.
 
 mod bus;
@@ -42,7 +43,7 @@ use sheet::Sheet;
 
 /// What a monitor shows.
 trait Subject {
-    /// Takes in what comes, waiting for it no longer than `wait`; whether something new may be shown.
+    /// Takes in what comes, waiting for it no longer than `wait`.
     fn advance(&mut self, wait: Duration) -> Result<(), Exit>;
     /// Whether enough is known for one snapshot, after so long.
     fn enough(&self, heard_for: Duration) -> bool;
@@ -62,7 +63,7 @@ enum Step {
     /// By a small step.
     Forth,
     Back,
-    /// By a tenth of it.
+    /// By a twentieth of it.
     FarForth,
     FarBack,
     Start,
