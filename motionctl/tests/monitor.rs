@@ -340,6 +340,7 @@ fn a_capture() {
     let broken = bench.run(&["monitor", "broken.log", "--once", "--json"]).ends(0);
     assert!(broken.stderr().contains("broken.log: line 2"), "{}", broken.stderr());
     assert_eq!(broken.json()["damaged"], 1);
+    bench.run(&["monitor", "broken.log", "--once"]).ends(0).says("  1 line gave no frame  ");
 }
 
 #[test]

@@ -34,7 +34,7 @@ pub(crate) struct Totals {
     /// Of these: second copies of sent frames.
     copies: u64,
     discarded_bytes: u64,
-    damaged: u64,
+    damaged: usize,
     /// Frames that are no copies.
     by_kind: [u64; NAMES.len()],
     /// The copies.

@@ -15,6 +15,7 @@ use super::{Step, Subject};
 use crate::decode::cli::Reading;
 use crate::decode::names::Names;
 use crate::exit::Exit;
+use crate::output::counted;
 
 /// A long step is so many parts of the capture.
 const PARTS: u64 = 20;
@@ -94,7 +95,7 @@ struct Replay<'a> {
     /// Frames of all of it, once its end has been reached.
     total: Option<u64>,
     /// Lines that gave no frame.
-    damaged: u64,
+    damaged: usize,
 }
 
 impl Replay<'_> {
@@ -151,7 +152,7 @@ impl Subject for Replay<'_> {
         let total = self.total.unwrap_or(self.at);
         let damaged = match self.damaged {
             0 => String::new(),
-            lines => format!("{lines} lines gave no frame  "),
+            lines => format!("{} gave no frame  ", counted(lines, "line", "lines")),
         };
         sheet.head = format!("frame {} of {total}  {damaged}{}", self.at, sheet.head);
         sheet

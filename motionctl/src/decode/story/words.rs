@@ -7,6 +7,7 @@ use canopen_master::trace::Lss;
 
 use super::super::names::bytes;
 use super::super::{Totals, named};
+use crate::output::counted;
 
 pub(super) fn lss_words(message: &Lss, data: &[u8]) -> (&'static str, String) {
     match message {
@@ -70,7 +71,7 @@ pub(in super::super) fn summary(totals: &Totals, out: &mut impl Write) -> io::Re
         write!(out, "; {} loop-back copies", totals.copies)?;
     }
     if totals.damaged > 0 {
-        write!(out, "; {} lines gave no frame", totals.damaged)?;
+        write!(out, "; {} gave no frame", counted(totals.damaged, "line", "lines"))?;
     }
     if totals.discarded_bytes > 0 {
         write!(out, "; {} bytes outside of telegrams", totals.discarded_bytes)?;
