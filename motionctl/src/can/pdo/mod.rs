@@ -7,7 +7,7 @@ use std::path::Path;
 use canopen_master::eds::{self, ConciseEntry};
 use canopen_master::sdo::Outcome;
 use canopen_master::{Address, NodeId};
-use pdo::mapping::MAX_ENTRIES;
+use pdo::mapping::{Entry, MAX_ENTRIES};
 use serde_json::{Value, json};
 
 use self::change::{Failed, Setup, change};
@@ -91,7 +91,8 @@ pub(crate) fn run(out: &Output, global: &Global, command: &Pdo) -> Result<(), Ex
             let id = id.as_deref().map(identifier).transpose()?;
             if global.dry_run {
                 let entry = |entry: &u32| {
-                    format!("{:04X}h:{:02X}, {} bits", entry >> 16, entry >> 8 & 0xFF, entry & 0xFF)
+                    let Entry { at, bits } = Entry::from_raw(*entry);
+                    format!("{:04X}h:{:02X}, {bits} bits", at.index, at.sub)
                 };
                 let parts = [
                     map.as_ref().map(|map| {
@@ -148,8 +149,8 @@ fn read(access: &mut Access<'_>, pdo: &str, place: Place) -> Result<Value, Exit>
     let count = access.read(place.mapping, 0)?;
     let mut mapping = Vec::new();
     for sub in 1..=count.min(64) as u8 {
-        let raw = access.read(place.mapping, sub)?;
-        mapping.push(json!({ "index": raw >> 16, "subindex": raw >> 8 & 0xFF, "bits": raw & 0xFF }));
+        let Entry { at, bits } = Entry::from_raw(access.read(place.mapping, sub)?);
+        mapping.push(json!({ "index": at.index, "subindex": at.sub, "bits": bits }));
     }
     Ok(json!({
         "node": access.node.raw(),
@@ -191,7 +192,7 @@ fn entry(text: &str) -> Result<u32, Exit> {
     let rest: Option<Vec<i128>> = parts.map(number).collect();
     match (index, rest.as_deref()) {
         (Some(index @ 0..=0xFFFF), Some(&[sub @ 0..=0xFF, bits @ 1..=64])) => {
-            Ok(index << 16 | (sub as u32) << 8 | bits as u32)
+            Ok(Entry::new(index as u16, sub as u8, bits as u8).raw())
         }
         _ => Err(wrong()),
     }
@@ -208,7 +209,7 @@ fn identifier(text: &str) -> Result<u32, Exit> {
 /// `motionctl can dcf NODE FILE`.
 pub(crate) fn dcf(out: &Output, global: &Global, line: &CanLine, node: u8, file: &Path) -> Result<(), Exit> {
     let name = file.display().to_string();
-    let bytes = std::fs::read(file).map_err(|error| Exit::file(&name, &error))?;
+    let bytes = crate::eds::bytes(file)?;
     let entries = entries(&bytes, node).map_err(|error| Exit::file(&name, &error))?;
     if global.dry_run {
         out.plan(&format!("would write {} objects to node {node}", entries.len()));
