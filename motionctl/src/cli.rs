@@ -1,5 +1,6 @@
 //! The command line.
 
+use core::time::Duration;
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -29,8 +30,8 @@ pub(crate) struct Global {
     #[arg(long, global = true, value_enum, default_value_t = Color::Auto)]
     pub(crate) color: Color,
     /// Seconds that a device has to begin its answer
-    #[arg(long, global = true, value_name = "SECONDS")]
-    pub(crate) timeout: Option<f64>,
+    #[arg(long, global = true, value_name = "SECONDS", value_parser = seconds)]
+    pub(crate) timeout: Option<Duration>,
     /// File with named endpoints: `[endpoints]` with lines `name = "endpoint"`, and `port = "…"` for all commands
     #[arg(long, global = true, value_name = "FILE", env = "MOTIONCTL_CONFIG")]
     pub(crate) config: Option<PathBuf>,
@@ -330,6 +331,16 @@ pub(crate) enum Params {
         #[arg(long, conflicts_with = "factory")]
         image: bool,
     },
+}
+
+/// Seconds above 0 as a time; none of other numbers.
+pub(crate) fn above_zero(seconds: f64) -> Option<Duration> {
+    Duration::try_from_secs_f64(seconds).ok().filter(|time| !time.is_zero())
+}
+
+/// Seconds above 0.
+pub(crate) fn seconds(text: &str) -> Result<Duration, String> {
+    text.parse().ok().and_then(above_zero).ok_or_else(|| "seconds above 0 expected".into())
 }
 
 fn number(text: &str) -> Result<u32, String> {

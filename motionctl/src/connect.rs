@@ -1,7 +1,5 @@
 //! From the command line to a device that can be called.
 
-use core::time::Duration;
-
 use motion_io::endpoint::Endpoint;
 use motion_io::lb2::{Client, Remark, TIMES};
 use motion_io::port::{Role, open};
@@ -65,12 +63,7 @@ pub(crate) fn endpoint(global: &Global, line: &Line) -> Result<Endpoint, Exit> {
 pub(crate) fn connect(out: &Output, global: &Global, line: &Line) -> Result<Client, Exit> {
     let endpoint = endpoint(global, line)?;
     let mut times = TIMES;
-    if let Some(seconds) = global.timeout {
-        times.answer = Duration::try_from_secs_f64(seconds)
-            .ok()
-            .filter(|timeout| !timeout.is_zero())
-            .ok_or_else(|| Exit::usage(format!("--timeout {seconds}: seconds above 0 expected")))?;
-    }
+    times.answer = global.timeout.unwrap_or(times.answer);
     let port = open(&endpoint, Role::Master).map_err(|error| Exit::trouble(error.to_string()))?;
     let mut client = Client::new(port, times, RETRIES);
     if let Some(device) = line.device {

@@ -5,8 +5,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand, ValueEnum};
 
-use super::session::duration;
-use crate::exit::Exit;
+use crate::cli::seconds;
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct Bus {
@@ -87,8 +86,8 @@ pub(crate) enum Can {
         #[command(flatten)]
         line: CanLine,
         /// Seconds between two requests to one node
-        #[arg(long, value_name = "S", default_value_t = 0.1)]
-        period: f64,
+        #[arg(long, value_name = "S", default_value = "0.1", value_parser = seconds)]
+        period: Duration,
         /// Life time factor: lost after so many periods without an answer
         #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u8).range(1..))]
         life: u8,
@@ -151,14 +150,8 @@ pub(crate) enum Can {
 #[derive(Debug, Clone, Args)]
 pub(crate) struct Stream {
     /// Stop after so many seconds
-    #[arg(long = "for", value_name = "S")]
-    pub(crate) seconds: Option<f64>,
-}
-
-impl Stream {
-    pub(crate) fn limit(&self) -> Result<Option<Duration>, Exit> {
-        self.seconds.map(|seconds| duration("--for", seconds)).transpose()
-    }
+    #[arg(long = "for", value_name = "S", value_parser = seconds)]
+    pub(crate) limit: Option<Duration>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -326,8 +319,8 @@ pub(crate) enum LinkCommand {
         #[command(flatten)]
         content: Content,
         /// Seconds between two frames, until stopped or for `--for` so long
-        #[arg(long, value_name = "S")]
-        period: Option<f64>,
+        #[arg(long, value_name = "S", value_parser = seconds)]
+        period: Option<Duration>,
         #[command(flatten)]
         line: CanLine,
         #[command(flatten)]

@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 
 use super::cli::{CanLine, Content, LinkCommand, Stream};
 use super::network::STEP;
-use super::session::{duration, endpoint, gone};
+use super::session::{endpoint, gone};
 use super::stop_flag;
 use super::value::{bytes, decode, encode, hex, named_type};
 use crate::cli::Global;
@@ -102,10 +102,6 @@ impl Device {
     }
 }
 
-fn limit(run: &Stream, default: Duration) -> Result<Duration, Exit> {
-    run.seconds.map_or(Ok(default), |seconds| duration("--for", seconds))
-}
-
 pub(crate) fn run(out: &Output, global: &Global, command: &LinkCommand) -> Result<(), Exit> {
     match command {
         LinkCommand::List { line, content, stream } => {
@@ -135,7 +131,7 @@ impl Content {
 
 /// All channels after listening for a while.
 fn list(out: &Output, mut device: Device, run: &Stream) -> Result<(), Exit> {
-    device.run(limit(run, LISTEN)?, |_, _| {})?;
+    device.run(run.limit.unwrap_or(LISTEN), |_, _| {})?;
     let channels: Vec<Value> = Channel::all().map(|channel| device.channel(channel)).collect();
     out.document(json!({ "channels": &channels }), || {
         let heard = channels.iter().filter(|channel| !channel["data"].is_null());
@@ -163,7 +159,7 @@ fn words(channel: &Value) -> String {
 
 /// Values as they come.
 fn watch(out: &Output, mut device: Device, run: &Stream) -> Result<(), Exit> {
-    device.run(limit(run, Duration::MAX)?, |device, event| {
+    device.run(run.limit.unwrap_or(Duration::MAX), |device, event| {
         let Event::Received(channel) = event else { return };
         let t = device.driver.now().as_secs_f64();
         let mut document = device.channel(channel);
@@ -179,15 +175,15 @@ fn set(
     global: &Global,
     line: &CanLine,
     (channel, data): (Channel, &[u8]),
-    period: Option<f64>,
+    period: Option<Duration>,
     run: &Stream,
 ) -> Result<(), Exit> {
     let (trigger, default) = match period {
-        Some(seconds) => (Trigger::Period(duration("--period", seconds)?), Duration::MAX),
+        Some(period) => (Trigger::Period(period), Duration::MAX),
         None => (Trigger::Change, FLUSH),
     };
     let setting = Setting { role: Role::Transmit(trigger), ..Setting::OFF };
-    let limit = limit(run, default)?;
+    let limit = run.limit.unwrap_or(default);
     if global.dry_run {
         out.plan(&format!("would send {} on channel {channel}", hex(data)));
         return Ok(());

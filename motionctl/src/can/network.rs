@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 
 use super::cli::{CanLine, Nmt, Stream};
 use super::record::listen;
-use super::session::{Session, duration, endpoint, node_id};
+use super::session::{Session, endpoint, node_id};
 use super::stop_flag;
 use super::value::hex;
 use crate::cli::Global;
@@ -207,7 +207,7 @@ fn stream(
     mut turn: impl FnMut(&mut Session, Duration) -> Result<(), Exit>,
 ) -> Result<(), Exit> {
     let stop = stop_flag()?;
-    let end = stream.limit()?.map_or(Duration::MAX, |limit| session.now().saturating_add(limit));
+    let end = stream.limit.map_or(Duration::MAX, |limit| session.now().saturating_add(limit));
     while !stop.load(Ordering::Relaxed) && session.now() < end {
         let limit = (session.now() + STEP).min(end);
         turn(session, limit)?;
@@ -220,13 +220,12 @@ pub(crate) fn guard(
     global: &Global,
     line: &CanLine,
     nodes: &[u8],
-    (period, life): (f64, u8),
+    (period, life): (Duration, u8),
     run: &Stream,
 ) -> Result<(), Exit> {
-    let period_ms = u16::try_from(duration("--period", period)?.as_millis())
-        .ok()
-        .filter(|ms| *ms > 0)
-        .ok_or_else(|| Exit::usage(format!("--period {period}: 0.001 to 65.535 s expected")))?;
+    let period_ms = u16::try_from(period.as_millis()).ok().filter(|ms| *ms > 0).ok_or_else(|| {
+        Exit::usage(format!("--period {}: 0.001 to 65.535 s expected", period.as_secs_f64()))
+    })?;
     let config = guarding::Config { period_ms, life_time_factor: life };
     let nodes = nodes.iter().map(|node| node_id(*node)).collect::<Result<Vec<_>, _>>()?;
     let mut session = Session::open(global, line)?;
@@ -288,7 +287,7 @@ pub(crate) fn emcy(out: &Output, global: &Global, line: &CanLine, run: &Stream) 
 }
 
 pub(crate) fn monitor(out: &Output, global: &Global, line: &CanLine, run: &Stream) -> Result<(), Exit> {
-    let limit = run.limit()?;
+    let limit = run.limit;
     let mut port = open(&endpoint(global, line)?).map_err(|error| Exit::trouble(error.to_string()))?;
     let mut tracer = Tracer::new();
     listen(&mut *port, limit, &*stop_flag()?, |now, event| {

@@ -84,7 +84,7 @@ pub(super) fn run(
     run: &Stream,
 ) -> Result<(), Exit> {
     let format = format_of(path)?;
-    let limit = run.limit()?;
+    let limit = run.limit;
     let endpoint = endpoint(global, line)?;
     let name = path.display().to_string();
     let trouble = |error: io::Error| Exit::file(&name, &error);

@@ -151,16 +151,8 @@ pub(crate) fn endpoint(global: &Global, line: &CanLine) -> Result<CanEndpoint, E
 }
 
 /// `--timeout`, or the default.
-pub(crate) fn answer_time(global: &Global) -> Result<Duration, Exit> {
-    global.timeout.map_or(Ok(ANSWER), |seconds| duration("--timeout", seconds))
-}
-
-/// Seconds above 0.
-pub(crate) fn duration(option: &str, seconds: f64) -> Result<Duration, Exit> {
-    Duration::try_from_secs_f64(seconds)
-        .ok()
-        .filter(|time| !time.is_zero())
-        .ok_or_else(|| Exit::usage(format!("{option} {seconds}: seconds above 0 expected")))
+pub(crate) fn answer_time(global: &Global) -> Duration {
+    global.timeout.unwrap_or(ANSWER)
 }
 
 /// A node ID.
@@ -175,7 +167,7 @@ pub(crate) fn gone(error: &std::io::Error) -> Exit {
 
 impl Session {
     pub(crate) fn open(global: &Global, line: &CanLine) -> Result<Self, Exit> {
-        let answer = answer_time(global)?;
+        let answer = answer_time(global);
         let endpoint = endpoint(global, line)?;
         let mut port = open(&endpoint).map_err(|error| Exit::trouble(error.to_string()))?;
         if !port.wait_for_peer(PEER).map_err(|error| gone(&error))? {

@@ -49,7 +49,7 @@ pub(crate) fn run(out: &Output, global: &Global, arguments: &Conform) -> Result<
     let config = Config {
         node: node_id(arguments.node)?,
         device: &device,
-        answer: answer_time(global)?,
+        answer: answer_time(global),
         permitted: global.yes,
     };
     let endpoint = endpoint(global, &arguments.line)?;

@@ -1,7 +1,5 @@
 //! From the command line to a link, and from a link's errors to exit codes.
 
-use core::time::Duration;
-
 use linmot::code::Status;
 use linmot::link::{Fault, Link};
 use linmot::linrs::{Checksum, Config};
@@ -39,22 +37,13 @@ pub(super) fn checksum(sum: SumKind) -> Checksum {
 }
 
 pub(super) fn connect(global: &Global, drive: &Drive) -> Result<AnyLink, Exit> {
-    let timeout = global
-        .timeout
-        .map(|seconds| {
-            Duration::try_from_secs_f64(seconds)
-                .ok()
-                .filter(|timeout| !timeout.is_zero())
-                .ok_or_else(|| Exit::usage(format!("--timeout {seconds}: seconds above 0 expected")))
-        })
-        .transpose()?;
     let (carrier, endpoint) = endpoint(global, drive)?;
     let wrong = |error: motion_io::endpoint::EndpointError| Exit::usage(error.to_string());
     if carrier == ChoiceOf::Port {
         let endpoint = endpoint.parse().map_err(wrong)?;
         let mut config = Config::new(drive.node);
         config.checksum = checksum(drive.checksum);
-        config.answer = timeout.unwrap_or(config.answer);
+        config.answer = global.timeout.unwrap_or(config.answer);
         let port = open(&endpoint, Role::Master).map_err(|error| Exit::trouble(error.to_string()))?;
         return Ok(AnyLink(Box::new(LinRsLink::new(port, config, RETRIES))));
     }
@@ -62,10 +51,10 @@ pub(super) fn connect(global: &Global, drive: &Drive) -> Result<AnyLink, Exit> {
     let endpoint = endpoint.parse().map_err(wrong)?;
     let port = motion_io::can::open(&endpoint).map_err(|error| Exit::trouble(error.to_string()))?;
     Ok(AnyLink(match drive.carrier {
-        Carrier::Sdo => Box::new(SdoLink::new(port, node, timeout, RETRIES)),
+        Carrier::Sdo => Box::new(SdoLink::new(port, node, global.timeout, RETRIES)),
         Carrier::Pdo => {
             let mut config = linmot::client::Config::default();
-            config.echo = timeout.unwrap_or(config.echo);
+            config.echo = global.timeout.unwrap_or(config.echo);
             Box::new(PdoLink::new(port, node, linmot::client::Client::new(config)))
         }
     }))

@@ -71,7 +71,7 @@ enum Step {
 }
 
 pub(crate) fn run(out: &Output, global: &Global, args: &Monitor) -> Result<(), Exit> {
-    let limit = args.stream.limit()?;
+    let limit = args.stream.limit;
     if out.json && !args.once {
         return Err(Exit::usage("--json needs --once: the screen is for people"));
     }

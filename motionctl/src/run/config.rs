@@ -10,6 +10,7 @@ use motion_io::endpoint::{CanEndpoint, Endpoint};
 use serde::Deserialize;
 
 use super::step::Step;
+use crate::cli::above_zero;
 use crate::exit::Exit;
 
 #[derive(Debug, Deserialize)]
@@ -147,7 +148,7 @@ impl Extension {
 
     fn check(&self) -> Result<(), Exit> {
         let Self::ModbusTcp { watchdog, .. } = self;
-        if Duration::try_from_secs_f64(*watchdog).is_ok_and(|time| !time.is_zero()) {
+        if above_zero(*watchdog).is_some() {
             return Ok(());
         }
         Err(Exit::usage(format!("[extension] watchdog = {watchdog}: a time above 0 expected")))

@@ -8,6 +8,7 @@ use serde::Deserialize;
 
 use super::config::BusName;
 use crate::can::value::bytes;
+use crate::cli::above_zero;
 use crate::exit::Exit;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
@@ -121,9 +122,7 @@ impl Step {
         if Duration::try_from_secs_f64(self.at).is_err() {
             return Err(self.wrong("at: a time from 0 on expected"));
         }
-        if let Some(time) =
-            self.duration.filter(|time| !Duration::try_from_secs_f64(*time).is_ok_and(|t| !t.is_zero()))
-        {
+        if let Some(time) = self.duration.filter(|time| above_zero(*time).is_none()) {
             return Err(self.wrong(format!("for {time}, a time above 0 expected")));
         }
         let to_a_position = matches!(self.action, Action::MoveAbsolute | Action::MoveRelative);
@@ -187,8 +186,9 @@ impl Step {
     /// How often write and send send.
     pub(super) fn period(&self) -> Result<Option<Duration>, Exit> {
         let Some(seconds) = self.period else { return Ok(None) };
-        let period = Duration::try_from_secs_f64(seconds).ok().filter(|period| !period.is_zero());
-        period.map(Some).ok_or_else(|| self.wrong(format!("period {seconds}, a time above 0 expected")))
+        above_zero(seconds)
+            .map(Some)
+            .ok_or_else(|| self.wrong(format!("period {seconds}, a time above 0 expected")))
     }
 
     /// When a channel is sent.
