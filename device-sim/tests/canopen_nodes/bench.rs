@@ -4,7 +4,7 @@ use core::time::Duration;
 
 use canopen_master::sdo::{Channel, Client, Options, Outcome};
 use device_sim::can::{Bus, Faults, Network};
-use device_sim::canopen::{Address, Fault, Ld2000, Node};
+use device_sim::canopen::{Address, Device, Fault, Ld2000, Node, RemoteIo};
 use pdo::{Frame, NodeId};
 
 pub(crate) const MS: Duration = Duration::from_millis(1);
@@ -48,7 +48,7 @@ pub(crate) struct Bench<D> {
     pub(crate) node: Node<D>,
 }
 
-impl<D: device_sim::canopen::Device> Bench<D> {
+impl<D: Device> Bench<D> {
     pub(crate) fn new(node: Node<D>, faults: Faults) -> Self {
         let id = node.node().map_or(127, NodeId::raw);
         let network = Network::new(Bus::new(500_000, faults), 2);
@@ -113,6 +113,18 @@ impl<D: device_sim::canopen::Device> Bench<D> {
     }
 }
 
+impl Bench<RemoteIo> {
+    /// Changes inputs of the I/O node.
+    pub(crate) fn with_io(&mut self, change: impl FnOnce(&mut RemoteIo)) {
+        let now = self.network.now();
+        self.node.with_device(now, |io, context| {
+            change(io);
+            io.update(context);
+        });
+        self.run(2 * MS);
+    }
+}
+
 impl Bench<Ld2000> {
     pub(crate) fn fail(&mut self, fault: Fault) {
         let now = self.network.now();
@@ -124,6 +136,23 @@ impl Bench<Ld2000> {
 pub(crate) fn id(raw: u8) -> Option<NodeId> {
     Some(NodeId::new(raw).unwrap())
 }
+
+/// What a master guards a node with.
+pub(crate) fn guard(node: u8) -> Frame {
+    let id = embedded_can::StandardId::new(0x700 + u16::from(node)).unwrap();
+    Frame::remote_frame(id, 1).unwrap()
+}
+
+/// How every device file here begins.
+pub(crate) const DEVICE_INFO: &str = "
+[DeviceInfo]
+VendorName=Nobody
+VendorNumber=7
+ProductName=Thing
+ProductNumber=8
+RevisionNumber=9
+LSS_Supported=1
+";
 
 pub(crate) const START: Frame = Frame::standard(0x000, [1, 0]);
 pub(crate) const SYNC: Frame = Frame::standard(0x080, []);

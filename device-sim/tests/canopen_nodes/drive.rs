@@ -8,7 +8,7 @@ use device_sim::can::Faults;
 use device_sim::canopen::{Fault, Ld2000};
 use pdo::Frame;
 
-use crate::bench::{Bench, MS, START, SYNC, id};
+use crate::bench::{Bench, MS, START, SYNC, guard, id};
 
 /// `domain-notes.md` item 2: frames as in the drive's manual, p. 116.
 #[test]
@@ -67,9 +67,8 @@ fn the_drive_stops_without_its_master() {
     for control in [6u16, 7, 15] {
         bench.put(0x6040, 0, &control.to_le_bytes());
     }
-    let guard = Frame::remote_frame(embedded_can::StandardId::new(0x701).unwrap(), 1).unwrap();
     for _ in 0..10 {
-        bench.send(guard);
+        bench.send(guard(1));
         bench.run(48 * MS);
     }
     assert_eq!(bench.node.device().motion().1, 100_000.0);
@@ -79,11 +78,11 @@ fn the_drive_stops_without_its_master() {
     // 8130h: communication, then the drive's own warning n04.
     assert_eq!(bench.heard(), ["081#3081110000000000", "081#3081110504000000"]);
     // The master is back: motion stays blocked until bit 11 goes to 1.
-    bench.send(guard);
+    bench.send(guard(1));
     bench.run(90 * MS);
     assert_eq!(bench.node.device().motion().1, 0.0);
     bench.put(0x6040, 0, &0x080Fu16.to_le_bytes());
-    bench.send(guard);
+    bench.send(guard(1));
     bench.run(90 * MS);
     assert!(bench.node.device().motion().1 > 0.0);
 }

@@ -12,15 +12,14 @@ use device_sim::can::{self, Faults};
 use device_sim::canopen::{FileNode, Ld2000, RemoteIo, device_file};
 use pdo::Frame;
 
-use bench::{Bench, MS, START, SYNC, id};
+use bench::{Bench, DEVICE_INFO, MS, START, SYNC, guard, id};
 
 #[test]
 fn boot_nmt_and_error_control() {
     let mut bench = Bench::new(RemoteIo::node(id(5), 1, false), Faults::NONE);
     assert_eq!(bench.heard(), ["705#00"]);
-    let guard = Frame::remote_frame(embedded_can::StandardId::new(0x705).unwrap(), 1).unwrap();
-    bench.send(guard);
-    bench.send(guard);
+    bench.send(guard(5));
+    bench.send(guard(5));
     assert_eq!(bench.heard(), ["705#7F", "705#FF"]);
     bench.put(0x1017, 0, &100u16.to_le_bytes());
     bench.heard();
@@ -118,13 +117,6 @@ fn device_files_have_the_names_and_kinds_of_the_standards() {
 #[test]
 fn a_node_from_a_device_file() {
     let file = "
-[DeviceInfo]
-VendorName=Nobody
-VendorNumber=7
-ProductName=Thing
-ProductNumber=8
-RevisionNumber=9
-LSS_Supported=1
 [MandatoryObjects]
 SupportedObjects=1
 1=0x1000
@@ -156,7 +148,7 @@ AccessType=rw
 DefaultValue=hello
 PDOMapping=0
 ";
-    let node = FileNode::node(file.as_bytes(), id(42), 5).unwrap();
+    let node = FileNode::node([DEVICE_INFO, file].concat().as_bytes(), id(42), 5).unwrap();
     let mut bench = Bench::new(node, Faults::NONE);
     assert_eq!(bench.heard(), ["72A#00"]);
     assert_eq!(bench.get(0x1000, 0), 0x1234_5678u32.to_le_bytes());
@@ -239,13 +231,12 @@ fn a_lost_master_is_told_and_so_is_its_return() {
     bench.put(0x100C, 0, &50u16.to_le_bytes());
     bench.put(0x100D, 0, &[2]);
     bench.send(START);
-    let guard = Frame::remote_frame(embedded_can::StandardId::new(0x705).unwrap(), 1).unwrap();
-    bench.send(guard);
+    bench.send(guard(5));
     bench.heard();
     bench.run(110 * MS);
     assert_eq!(bench.heard(), ["085#3081110000000000"]);
     assert_eq!(bench.node.state(), canopen_master::nmt::State::PreOperational);
-    bench.send(guard);
+    bench.send(guard(5));
     assert_eq!(bench.heard(), ["705#FF", "085#0000000000000000"]);
     assert_eq!(bench.get(0x1003, 0), [1]);
 }

@@ -5,7 +5,7 @@ use device_sim::can::Faults;
 use device_sim::canopen::{Address, FileNode, Node, RemoteIo};
 use pdo::Frame;
 
-use crate::bench::{Bench, MS, START, SYNC, id};
+use crate::bench::{Bench, DEVICE_INFO, MS, START, SYNC, id};
 
 #[test]
 fn io_node_speaks_through_its_pdos() {
@@ -15,13 +15,10 @@ fn io_node_speaks_through_its_pdos() {
     bench.send(START);
     // Digital inputs at once, analogue ones only when 6423h allows it.
     assert_eq!(bench.heard(), ["185#00"]);
-    let now = bench.network.now();
-    bench.node.with_device(now, |io, context| {
+    bench.with_io(|io| {
         io.set_inputs(0xA5);
         io.set_analogue(2, -2);
-        device_sim::canopen::Device::update(io, context);
     });
-    bench.run(2 * MS);
     assert_eq!(bench.heard(), ["185#A5"]);
     bench.put(0x6423, 0, &[1]);
     bench.run(2 * MS);
@@ -78,15 +75,6 @@ fn a_mapping_is_set_up_in_the_standard_order_and_not_otherwise() {
     assert_eq!(bench.heard(), ["1A5#000000", "1A5#000000"]);
 }
 
-fn set_inputs(bench: &mut Bench<RemoteIo>, inputs: u8) {
-    let now = bench.network.now();
-    bench.node.with_device(now, |io, context| {
-        io.set_inputs(inputs);
-        device_sim::canopen::Device::update(io, context);
-    });
-    bench.run(2 * MS);
-}
-
 /// Transmission type 0: one PDO at the SYNC after a change, and none without.
 #[test]
 fn an_acyclic_pdo_follows_a_change() {
@@ -100,12 +88,12 @@ fn an_acyclic_pdo_follows_a_change() {
     };
     assert_eq!(syncs(&mut bench), ["185#00"]);
     assert_eq!(syncs(&mut bench), [""; 0]);
-    set_inputs(&mut bench, 0x81);
+    bench.with_io(|io| io.set_inputs(0x81));
     assert_eq!(bench.heard(), [""; 0]);
     assert_eq!(syncs(&mut bench), ["185#81"]);
     // There and back between two SYNCs: nothing has changed.
-    set_inputs(&mut bench, 0x80);
-    set_inputs(&mut bench, 0x81);
+    bench.with_io(|io| io.set_inputs(0x80));
+    bench.with_io(|io| io.set_inputs(0x81));
     assert_eq!(syncs(&mut bench), [""; 0]);
 }
 
@@ -117,9 +105,9 @@ fn only_the_sync_looks_for_a_change_of_an_acyclic_pdo() {
     bench.send(START);
     bench.send(SYNC);
     bench.heard();
-    set_inputs(&mut bench, 0x80);
+    bench.with_io(|io| io.set_inputs(0x80));
     bench.send(Frame::standard(0x205, [0x3C]));
-    set_inputs(&mut bench, 0);
+    bench.with_io(|io| io.set_inputs(0));
     bench.send(SYNC);
     assert_eq!(bench.heard(), [""; 0]);
 }
@@ -135,7 +123,7 @@ fn inhibit_time_and_event_timer() {
     bench.heard();
     bench.send(START);
     assert_eq!(bench.heard(), ["185#00"]);
-    (1..=4).for_each(|inputs| set_inputs(&mut bench, inputs));
+    (1..=4).for_each(|inputs| bench.with_io(|io| io.set_inputs(inputs)));
     assert_eq!(bench.heard(), [""; 0]);
     bench.run(45 * MS);
     assert_eq!(bench.heard(), ["185#04"]);
@@ -211,12 +199,6 @@ fn stored_identifiers_follow_the_address_too() {
 }
 
 const FILE: &str = "
-[DeviceInfo]
-VendorName=Nobody
-VendorNumber=7
-ProductName=Thing
-ProductNumber=8
-RevisionNumber=9
 [ManufacturerObjects]
 SupportedObjects=2
 1=0x3000
@@ -315,8 +297,9 @@ DefaultValue=0x30010010
 #[test]
 fn a_device_file_says_what_its_pdos_are() {
     let out = |node: &Node<FileNode>| node.objects().get(0x3000, 0);
+    let file = [DEVICE_INFO, FILE].concat();
     for address in [id(42), None] {
-        let mut bench = Bench::new(FileNode::node(FILE.as_bytes(), address, 5).unwrap(), Faults::NONE);
+        let mut bench = Bench::new(FileNode::node(file.as_bytes(), address, 5).unwrap(), Faults::NONE);
         readdress(&mut bench, 42, 43);
         bench.send(Frame::standard(0x22B, [0x78, 0x56]));
         assert_eq!(out(&bench.node), 0x5678);

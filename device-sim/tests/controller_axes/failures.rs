@@ -5,7 +5,6 @@ use core::time::Duration;
 
 use canopen_master::ds402;
 use device_sim::can::{Faults, State as CanState};
-use device_sim::canopen::Fault;
 use device_sim::plant::{Connection, Drive, Incremental, Plant, Sensor, Ssi, Wiring};
 use lb2::code::Failure;
 use motion_core::application::{MotionError, Order, Progress, State};
@@ -191,8 +190,7 @@ fn fault_of_a_drive() {
     let mut rig = Rig::enabled(&[]);
     rig.order(3, BACKWARD);
     rig.run(1000 * MS);
-    let now = rig.now();
-    rig.drives[3].with_device(now, |drive, context| drive.fail(context, Fault::Motor));
+    rig.fault(3);
     // Its emergency comes with this cycle.
     rig.cycle();
     rig.cycle();
@@ -228,8 +226,7 @@ fn loss_and_fault_of_a_drive_in_every_motion() {
                     rig.plug(axis, false);
                     rig.until("lost", |rig| rig.status(axis).state == State::ErrorStop);
                 } else {
-                    let now = rig.now();
-                    rig.drives[axis].with_device(now, |drive, context| drive.fail(context, Fault::Motor));
+                    rig.fault(axis);
                     rig.cycle();
                     rig.cycle();
                 }
@@ -252,8 +249,7 @@ fn loss_and_fault_of_a_drive_in_every_motion() {
 #[test]
 fn a_drive_that_is_enabled_in_a_fault_tells_it_again() {
     let mut rig = Rig::enabled(&[]);
-    let now = rig.now();
-    rig.drives[0].with_device(now, |drive, context| drive.fail(context, Fault::Motor));
+    rig.fault(0);
     rig.run(30 * MS);
     rig.assert_failed(0, DRIVE_FAULT);
     rig.set_power(false);

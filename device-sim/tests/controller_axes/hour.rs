@@ -4,7 +4,6 @@ use core::time::Duration;
 
 use canopen_master::ds402;
 use device_sim::can::Faults;
-use device_sim::canopen::Fault;
 use lb2::code::Failure;
 use motion_core::application::{Order, Progress, State, Ticket};
 use motion_core::failure::{DRIVE_FAULT, DRIVE_LOST};
@@ -180,7 +179,7 @@ impl Run {
                 self.tally.dropouts += 1;
             }
             Kind::Fault => {
-                self.rig.drives[axis].with_device(now, |drive, context| drive.fail(context, Fault::Motor));
+                self.rig.fault(axis);
                 self.tally.faults += 1;
             }
         }

@@ -4,7 +4,7 @@ use core::time::Duration;
 
 use canopen_master::ds402;
 use device_sim::can::{Bus, Event as CanEvent, Faults, Network, Node, StationId};
-use device_sim::canopen::{self, Ld2000};
+use device_sim::canopen::{self, Fault, Ld2000};
 use device_sim::plant::{Machine, Switch};
 use lb2::code::{Failure, StoredFailure};
 use lb2::device::{Device, DeviceEngine};
@@ -179,6 +179,12 @@ impl Rig {
     pub(crate) fn drive<T>(&mut self, axis: usize, work: impl FnOnce(&mut Ld2000) -> T) -> T {
         let now = self.now();
         self.drives[axis].with_device(now, |drive, _| work(drive))
+    }
+
+    /// The motor of an axis fails.
+    pub(crate) fn fault(&mut self, axis: usize) {
+        let now = self.now();
+        self.drives[axis].with_device(now, |drive, context| drive.fail(context, Fault::Motor));
     }
 
     pub(crate) fn state(&mut self, axis: usize) -> ds402::State {
