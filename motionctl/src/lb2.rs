@@ -1,9 +1,10 @@
 //! `motionctl lb2 …`: LB2 functions one by one.
 
+use lb2::code::StoredFailure;
 use lb2::frame::MAX_DATA;
 use lb2::telegram::{BANK_LEN, MAX_BANK_DATA, Request, Response, bank};
-use motion_io::lb2::Client;
-use serde_json::json;
+use motion_io::lb2::{CallError, Client};
+use serde_json::{Value, json};
 
 use crate::cli::{Global, Lb2, Line, Range};
 use crate::connect::{connect, remarks};
@@ -63,31 +64,55 @@ fn written(out: &Output, file: &str, len: usize) {
     out.document(json!({ "file": file, "bytes": len }), || println!("{len} bytes written to {file}"));
 }
 
+/// What a device says of itself.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Identity {
+    pub(crate) model: u16,
+    pub(crate) axes: u8,
+    pub(crate) os_version: String,
+    pub(crate) custom_version: String,
+}
+
+impl Identity {
+    pub(crate) fn read(client: &mut Client) -> Result<Self, CallError> {
+        let (model, axes) = client.device_type()?;
+        let os_version = client.os_version()?.to_string();
+        let custom_version = client.custom_version()?.to_string();
+        Ok(Self { model, axes, os_version, custom_version })
+    }
+
+    /// With the device number `[005]`, where it is known.
+    pub(crate) fn json(&self, number: Option<i32>) -> Value {
+        json!({
+            "model": self.model,
+            "axes": self.axes,
+            "os_version": self.os_version,
+            "custom_version": self.custom_version,
+            "device_number": number,
+        })
+    }
+}
+
 fn identify(out: &Output, global: &Global, line: &Line) -> Result<(), Exit> {
     let mut client = connect(out, global, line)?;
-    let (model, axes) = client.device_type()?;
-    let (os, custom) = (client.os_version()?, client.custom_version()?);
+    let identity = Identity::read(&mut client)?;
     let number = client.read_parameter(5)?;
     remarks(out, &mut client);
-    let document = json!({
-        "model": model,
-        "axes": axes,
-        "os_version": os.to_string(),
-        "custom_version": custom.to_string(),
-        "device_number": number,
-    });
-    out.document(document, || {
+    out.document(identity.json(Some(number)), || {
+        let Identity { model, axes, os_version: os, custom_version: custom } = &identity;
         println!("GEL {model}, {axes} axes, operating system {os}, customized software {custom}, device number {number}");
     });
     Ok(())
 }
 
+pub(crate) fn failure_json(stored: &StoredFailure) -> Value {
+    json!({ "axis": stored.axis, "failure": stored.failure.0, "text": stored.failure.to_string() })
+}
+
 fn failures(out: &Output, global: &Global, line: &Line) -> Result<(), Exit> {
     let failures = connect(out, global, line)?.failures()?;
-    let list = failures
-        .iter()
-        .map(|f| json!({ "axis": f.axis, "failure": f.failure.0, "text": f.failure.to_string() }));
-    out.document(json!({ "failures": list.collect::<Vec<_>>() }), || {
+    let list: Vec<_> = failures.iter().map(failure_json).collect();
+    out.document(json!({ "failures": list }), || {
         if failures.is_empty() {
             println!("no failure stored");
         }

@@ -11,12 +11,13 @@ use serde_json::Value;
 
 use super::Subject;
 use super::cli::Monitor;
-use super::controller::{Controller, Heard, Identity, Place, asked};
+use super::controller::{Controller, Heard, Place, asked};
 use super::sheet::Sheet;
 use crate::can::value::{named_type, number};
 use crate::cli::{Global, Line};
 use crate::connect::{connect, endpoint};
 use crate::exit::Exit;
+use crate::lb2::Identity;
 use crate::output::Output;
 
 /// Failures and RAM are asked for again after so many parameters.
@@ -93,12 +94,7 @@ struct Asker {
 impl Asker {
     /// Asks for everything once; `None` when nobody wants to know any more, or the line is gone.
     fn round(&mut self) -> Option<()> {
-        self.ask("identity", |client| {
-            let (model, axes) = client.device_type()?;
-            let (os, custom) = (client.os_version()?, client.custom_version()?);
-            let (os_version, custom_version) = (os.to_string(), custom.to_string());
-            Ok(Heard::Identity(Identity { model, axes, os_version, custom_version }))
-        })?;
+        self.ask("identity", |client| Identity::read(client).map(Heard::Identity))?;
         self.often()?;
         for at in 0..self.parameters.len() {
             if at > 0 && at % STRIDE == 0 {

@@ -9,18 +9,10 @@ use motion_core::parameters::{Entry, RangeError, ValueError, Values, get, iter};
 use toml_edit::{Document, Item};
 
 use crate::exit::Exit;
+use crate::lb2::Identity;
 
 /// Version of the file's format.
 const FORMAT: i64 = 1;
-
-/// What a device says of itself.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Identity {
-    pub(crate) model: u16,
-    pub(crate) axes: u8,
-    pub(crate) os_version: String,
-    pub(crate) custom_version: String,
-}
 
 /// Parameters, of a device or a file.
 #[derive(Debug, Clone)]

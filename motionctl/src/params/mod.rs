@@ -13,8 +13,9 @@ use serde_json::{Value, json};
 use crate::cli::{Global, Line, Params};
 use crate::connect::{connect, remarks};
 use crate::exit::Exit;
+use crate::lb2::Identity;
 use crate::output::Output;
-use file::{Backup, Identity};
+use file::Backup;
 
 pub(crate) fn run(out: &Output, global: &Global, command: &Params) -> Result<(), Exit> {
     match command {
@@ -30,7 +31,7 @@ pub(crate) fn run(out: &Output, global: &Global, command: &Params) -> Result<(),
                     let mut client = connect(out, global, line)?;
                     let wanted: Vec<Entry> = iter().collect();
                     Backup {
-                        identity: Some(identify(&mut client)?),
+                        identity: Some(Identity::read(&mut client)?),
                         values: read(out, &mut client, &wanted)?,
                     }
                 }
@@ -55,16 +56,6 @@ pub(crate) fn run(out: &Output, global: &Global, command: &Params) -> Result<(),
 
 fn entry(key: &str) -> Result<Entry, Exit> {
     find(key).map_err(|error| Exit::usage(error.to_string()))
-}
-
-fn identify(client: &mut Client) -> Result<Identity, Exit> {
-    let (model, axes) = client.device_type()?;
-    Ok(Identity {
-        model,
-        axes,
-        os_version: client.os_version()?.to_string(),
-        custom_version: client.custom_version()?.to_string(),
-    })
 }
 
 fn read(out: &Output, client: &mut Client, entries: &[Entry]) -> Result<BTreeMap<u16, i32>, Exit> {
@@ -211,7 +202,7 @@ fn backup(
     changed: bool,
 ) -> Result<(), Exit> {
     let mut client = connect(out, global, line)?;
-    let identity = identify(&mut client)?;
+    let identity = Identity::read(&mut client)?;
     let entries: Vec<Entry> = iter().collect();
     if global.dry_run {
         out.plan(&format!(

@@ -9,10 +9,11 @@ use motion_io::lb2::Client;
 use serde_json::json;
 
 use super::file::{self, Backup};
-use super::{identify, read};
+use super::read;
 use crate::cli::{Global, Line};
 use crate::connect::connect;
 use crate::exit::Exit;
+use crate::lb2::Identity;
 use crate::output::Output;
 
 /// Writes, reads back, calls the loader, and saves if told to. If a step fails, the old values are put
@@ -130,7 +131,7 @@ pub(super) fn restore(
         wanted.push((entry, value));
     }
     let mut client = connect(out, global, line)?;
-    let device = identify(&mut client)?;
+    let device = Identity::read(&mut client)?;
     if let Some(identity) = &backup.identity
         && identity.model != device.model
         && !force

@@ -23,7 +23,7 @@ use motion_core::application::{AxisStatus, State};
 use motion_core::io::Outputs;
 use motion_core::parameters::get;
 use motion_core::storage::Storage;
-use motion_core::{Controller, STORAGE_LEN};
+use motion_core::{AXES, Controller, STORAGE_LEN};
 use motion_io::port::{Role, open};
 
 use crate::can::stop_flag;
@@ -198,7 +198,7 @@ fn control(
             }
         }
         let resting = |status: &AxisStatus| matches!(status.state, State::Disabled | State::Standstill);
-        let at_rest = (0..6).filter_map(|axis| controller.axis_status(axis)).all(resting);
+        let at_rest = (0..usize::from(AXES)).filter_map(|axis| controller.axis_status(axis)).all(resting);
         for at in program.take_scans() {
             let outcome = if at_rest && controller.scan(at) { Outcome::Done } else { Outcome::Refused };
             report.step(now, (Subject::Bus(at), Action::Scan, outcome));
@@ -220,7 +220,7 @@ fn control(
         controller.advance(now.saturating_sub(before)).map_err(|error| Exit::trouble(error.to_string()))?;
         before = now;
         let activated = usize::try_from(controller.working().at(0, 0)).unwrap_or(0);
-        for axis in 0..6 {
+        for axis in 0..usize::from(AXES) {
             if let Some(status) = controller.axis_status(axis) {
                 report.axis(now, axis, status);
                 if let Some(recorder) = recorder.filter(|_| axis < activated) {
@@ -241,7 +241,7 @@ fn control(
             ending = Some(now);
         } else if let Some(since) = ending {
             let resting = |axis| controller.axis_status(axis).is_none_or(|s| s.state == State::Disabled);
-            if (0..6).all(resting) {
+            if (0..usize::from(AXES)).all(resting) {
                 break;
             }
             if now > since + STANDSTILL {

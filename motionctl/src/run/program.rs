@@ -2,6 +2,7 @@
 
 use core::time::Duration;
 
+use motion_core::AXES;
 use motion_core::application::blocks::{
     GearIn, GearOut, Halt, Home, Jog, MoveAbsolute, MoveRelative, MoveVelocity, Outputs, Power, Reset,
     SetPosition, Stop,
@@ -105,7 +106,7 @@ impl Program {
     /// (decision 28).
     pub(super) fn stop(&mut self) {
         if !core::mem::replace(&mut self.stopping, true) {
-            self.stops = (1..=6).map(|axis| (Stop::new(axis), Power::new(axis))).collect();
+            self.stops = (1..=AXES).map(|axis| (Stop::new(axis), Power::new(axis))).collect();
         }
     }
 

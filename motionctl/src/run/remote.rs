@@ -18,6 +18,7 @@
 //! Where the bus is not in data exchange the axis is halted; when it is back, orders are taken once their
 //! bits have all been 0: what stood in the image before the loss moves nothing.
 
+use motion_core::AXES;
 use motion_core::application::blocks::{Halt, Home, Jog, MoveAbsolute, Power, Reset, Stop};
 use motion_core::application::{MotionError, Plc, State};
 
@@ -49,7 +50,7 @@ pub(super) struct Remote {
 
 impl Remote {
     pub(super) fn new() -> Self {
-        let axes = (1..=6).map(|axis| Axis {
+        let axes = (1..=AXES).map(|axis| Axis {
             power: Power::new(axis),
             motion: MoveAbsolute::new(axis),
             halt: Halt::new(axis),

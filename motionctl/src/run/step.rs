@@ -3,6 +3,7 @@
 use core::time::Duration;
 
 use can_link::{Channel, Trigger};
+use motion_core::AXES;
 use motion_core::bus::OBJECTS;
 use serde::Deserialize;
 
@@ -146,8 +147,8 @@ impl Step {
             Action::Scan => {}
             _ => {
                 let axis = self.need(self.axis, "axis")?;
-                if !(1..=6).contains(&axis) {
-                    return Err(self.wrong(format!("axis {axis}, 1 to 6 expected")));
+                if !(1..=AXES).contains(&axis) {
+                    return Err(self.wrong(format!("axis {axis}, 1 to {AXES} expected")));
                 }
             }
         }

@@ -12,19 +12,10 @@ use canopen_master::data_type::DataType;
 use lb2::code::StoredFailure;
 use motion_core::parameters::{Entry, Values, get};
 
+use crate::lb2::Identity;
+
 /// Lines of what happened that are kept.
 const LINES: usize = 500;
-/// Axes of every model.
-const AXES: usize = 6;
-
-/// Who answers.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Identity {
-    pub(super) model: u16,
-    pub(super) axes: u8,
-    pub(super) os_version: String,
-    pub(super) custom_version: String,
-}
 
 /// An answer, or that there was none.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -2,14 +2,16 @@
 
 use core::time::Duration;
 
+use motion_core::AXES;
 use motion_core::bus::{OBJECTS, Object, Role, Settings};
 use motion_core::parameters::{Values, get};
 use serde_json::{Value, json};
 
 use super::super::bus::age;
 use super::super::sheet::{Sheet, Table, Tone};
-use super::{AXES, Controller, Identity, Place, source};
+use super::{Controller, Place, source};
 use crate::can::value::{decode, hex};
+use crate::lb2::{Identity, failure_json};
 
 /// What a CAN bus is, and its objects: name, kind, node.
 type Bus = (&'static str, Vec<(String, String, u8)>);
@@ -26,11 +28,11 @@ impl Controller {
     }
 
     /// Of an axis: mode, input and its type, output and its type, greatest and working velocity.
-    fn axis(&self, axis: usize, display: &Values) -> [Option<String>; 7] {
-        let own = |first: u16| self.text(first + axis as u16, display);
+    fn axis(&self, axis: u8, display: &Values) -> [Option<String>; 7] {
+        let own = |first: u16| self.text(first + u16::from(axis), display);
         // Choices 1 to 6 of [606] and [612] are the inputs and outputs.
         let of = |choice: u16, first: u16| {
-            let number = *self.values.get(&(choice + axis as u16))?;
+            let number = *self.values.get(&(choice + u16::from(axis)))?;
             let number = u16::try_from(number).ok().filter(|number| (1..=6).contains(number))?;
             self.text(first + number - 1, display)
         };
@@ -102,10 +104,9 @@ impl Controller {
             "failures>",
         ];
         let mut table = Table::new("Axes", &columns, "");
-        let active = self.values.get(&0).and_then(|count| usize::try_from(*count).ok()).unwrap_or(AXES);
+        let active = self.values.get(&0).and_then(|count| u8::try_from(*count).ok()).unwrap_or(AXES);
         for axis in 0..AXES {
-            let failures =
-                self.failures.iter().flatten().filter(|stored| usize::from(stored.axis) == axis + 1).count();
+            let failures = self.failures.iter().flatten().filter(|stored| stored.axis == axis + 1).count();
             let tone = match failures {
                 0 if axis >= active => Tone::Faint,
                 0 => Tone::Plain,
@@ -169,21 +170,10 @@ impl Controller {
 
     pub(in super::super) fn document(&self) -> Value {
         let display = self.display();
-        let identity = self.identity.as_ref().map(|identity| {
-            json!({
-                "model": identity.model,
-                "axes": identity.axes,
-                "os_version": identity.os_version,
-                "custom_version": identity.custom_version,
-                "device_number": self.values.get(&5),
-            })
-        });
-        let failures = self.failures.as_ref().map(|failures| {
-            let failures = failures.iter().map(|stored| {
-                json!({ "axis": stored.axis, "failure": stored.failure.0, "text": stored.failure.to_string() })
-            });
-            failures.collect::<Vec<_>>()
-        });
+        let number = self.values.get(&5).copied();
+        let identity = self.identity.as_ref().map(|identity| identity.json(number));
+        let failures =
+            self.failures.as_ref().map(|failures| failures.iter().map(failure_json).collect::<Vec<_>>());
         let axes = (0..AXES).map(|axis| {
             let [mode, input, input_type, output, output_type, v_max, v_work] = self.axis(axis, &display);
             json!({
