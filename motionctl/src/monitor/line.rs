@@ -1,20 +1,18 @@
 //! A capture of an LB2 line: which functions were called, the values of parameters, and its story.
 
 use core::time::Duration;
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::BTreeMap;
 use std::io::{self, Read, Write};
 
 use motion_io::capture::Capture;
 use serde_json::{Value, json};
 
 use super::Subject;
+use super::lines::Lines;
 use super::sheet::{Sheet, Table, Tone};
 use crate::decode::cli::Reading;
 use crate::decode::decode_lb2;
 use crate::exit::Exit;
-
-/// Lines of the story that are kept.
-const LINES: usize = 500;
 
 /// How often a function was called and answered.
 #[derive(Debug, Default, Clone, PartialEq, Eq)]
@@ -36,16 +34,16 @@ pub(super) struct Line {
     telegrams: u64,
     gaps: u64,
     discarded_bytes: u64,
-    lines: VecDeque<String>,
+    lines: Lines,
 }
 
 /// Whole lines of what is written.
-struct Lines<F> {
+struct ByLine<F> {
     take: F,
     rest: Vec<u8>,
 }
 
-impl<F: FnMut(&str)> Write for Lines<F> {
+impl<F: FnMut(&str)> Write for ByLine<F> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         for byte in bytes {
             if *byte == b'\n' {
@@ -75,7 +73,7 @@ impl Line {
             let Capture::Lb2(reader) = capture else {
                 return Err(Exit::file(file, &"it is another file now"));
             };
-            let mut lines = Lines { take, rest: Vec::new() };
+            let mut lines = ByLine { take, rest: Vec::new() };
             // Told once, though it is read twice.
             decode_lb2(json, file, reader, &mut lines, |damage| {
                 if json {
@@ -84,13 +82,8 @@ impl Line {
             })
         };
         decode(true, &mut |object| line.take(object))?;
-        let mut lines = VecDeque::new();
-        decode(false, &mut |text| {
-            if lines.len() == LINES {
-                lines.pop_front();
-            }
-            lines.push_back(text.to_owned());
-        })?;
+        let mut lines = Lines::default();
+        decode(false, &mut |text| lines.push(text.to_owned()))?;
         line.lines = lines;
         Ok(line)
     }
@@ -155,11 +148,8 @@ impl Subject for Line {
             let name = entry.map_or_else(|| format!("[{index:03}]"), |entry| entry.to_string());
             values.push(Tone::Plain, [name, value.to_string()]);
         }
-        let mut story = Table::new("What happened", &[], "nothing");
-        story.tail = true;
-        self.lines.iter().for_each(|line| story.push(Tone::Plain, [line.clone()]));
         let head = format!("{}  {} LB2 telegrams", self.file, self.telegrams);
-        Sheet { head, tables: vec![functions, errors, values, story] }
+        Sheet { head, tables: vec![functions, errors, values, self.lines.table("nothing")] }
     }
 
     fn document(&self) -> Value {

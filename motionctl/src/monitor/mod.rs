@@ -20,6 +20,7 @@ pub(crate) mod cli;
 mod controller;
 mod draw;
 mod line;
+mod lines;
 mod listen;
 mod nodes;
 mod poll;

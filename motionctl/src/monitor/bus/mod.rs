@@ -2,7 +2,7 @@
 
 mod show;
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::BTreeMap;
 
 use canopen_master::NodeId;
 use canopen_master::trace::{Kind, Tracer, Transfer};
@@ -10,19 +10,17 @@ use motion_io::can::BusEvent;
 use motion_io::capture::{FrameKind, Reader, Record, Time};
 use serde_json::{Value, json};
 
+use super::lines::Lines;
 use super::nodes::{Node, sender};
 use super::traffic::Traffic;
 use crate::decode::names::Names;
 use crate::decode::story::Story;
 use crate::decode::{Ear, Teller, Totals, number_of};
 
-/// Lines of the story that are kept.
-const LINES: usize = 500;
-
 /// Everything that the frames told. Times in nanoseconds.
 struct Watch<'a> {
     story: Story<'a>,
-    lines: VecDeque<String>,
+    lines: Lines,
     traffic: BTreeMap<u16, Traffic>,
     nodes: BTreeMap<(u16, NodeId), Node>,
     last: Option<i64>,
@@ -36,10 +34,7 @@ impl Watch<'_> {
             return;
         }
         for line in String::from_utf8_lossy(text).lines() {
-            if self.lines.len() == LINES {
-                self.lines.pop_front();
-            }
-            self.lines.push_back(line.to_owned());
+            self.lines.push(line.to_owned());
         }
         text.clear();
     }
@@ -117,7 +112,7 @@ impl<'a> Buses<'a> {
             totals: Totals::default(),
             watch: Watch {
                 story: Story::new(objects, false),
-                lines: VecDeque::new(),
+                lines: Lines::default(),
                 traffic: BTreeMap::new(),
                 nodes: BTreeMap::new(),
                 last: None,

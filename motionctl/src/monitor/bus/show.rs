@@ -133,13 +133,6 @@ impl Buses<'_> {
         table
     }
 
-    fn story_table(&self) -> Table {
-        let mut table = Table::new("What happened", &[], "nothing yet");
-        table.tail = true;
-        self.watch.lines.iter().for_each(|line| table.push(Tone::Plain, [line.clone()]));
-        table
-    }
-
     fn span(&self) -> Option<i64> {
         self.now.zip(self.start).map(|(now, start)| now.saturating_sub(start))
     }
@@ -148,7 +141,12 @@ impl Buses<'_> {
         let span = self.span().map_or_else(String::new, |span| format!("{:.1} s  ", span as f64 / 1e9));
         Sheet {
             head: format!("{span}{}", self.title),
-            tables: vec![self.bus_table(), self.node_table(), self.cycle_table(), self.story_table()],
+            tables: vec![
+                self.bus_table(),
+                self.node_table(),
+                self.cycle_table(),
+                self.watch.lines.table("nothing yet"),
+            ],
         }
     }
 

@@ -6,16 +6,14 @@
 mod show;
 
 use core::time::Duration;
-use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::collections::{BTreeMap, BTreeSet};
 
 use canopen_master::data_type::DataType;
 use lb2::code::StoredFailure;
 use motion_core::parameters::{Entry, Values, get};
 
+use super::lines::Lines;
 use crate::lb2::Identity;
-
-/// Lines of what happened that are kept.
-const LINES: usize = 500;
 
 /// An answer, or that there was none.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -83,7 +81,7 @@ pub(super) struct Controller {
     /// Since when it has not answered.
     silent: Option<Duration>,
     rounds: u64,
-    lines: VecDeque<String>,
+    lines: Lines,
     /// Refusals and remarks among them, also of lines that are no longer kept.
     told: BTreeSet<String>,
 }
@@ -100,7 +98,7 @@ impl Controller {
             ram: ram.into_iter().map(|place| (place, None)).collect(),
             silent: None,
             rounds: 0,
-            lines: VecDeque::new(),
+            lines: Lines::default(),
             told: BTreeSet::new(),
         }
     }
@@ -114,11 +112,7 @@ impl Controller {
     }
 
     fn tell(&mut self, what: &str) {
-        let line = format!("{:>12.6}  {what}", self.now.as_secs_f64());
-        if self.lines.len() == LINES {
-            self.lines.pop_front();
-        }
-        self.lines.push_back(line);
+        self.lines.push(format!("{:>12.6}  {what}", self.now.as_secs_f64()));
     }
 
     pub(super) fn hear(&mut self, heard: Heard) {
@@ -205,7 +199,9 @@ mod tests {
     use serde_json::json;
 
     fn told(controller: &Controller) -> String {
-        controller.lines.iter().map(|line| format!("{}\n", line.trim_start())).collect()
+        let story = serde_json::to_value(&controller.lines).unwrap();
+        let lines = story.as_array().unwrap().iter().map(|line| line.as_str().unwrap().trim_start());
+        lines.map(|line| format!("{line}\n")).collect()
     }
 
     #[test]
@@ -260,7 +256,7 @@ mod tests {
         for number in (0..30).cycle().take(90) {
             controller.hear(Heard::Refused(format!("parameter [{number:03}]: refused")));
         }
-        assert_eq!(controller.lines.len(), 30);
+        assert_eq!(told(&controller).lines().count(), 30);
     }
 
     #[test]

@@ -159,12 +159,9 @@ impl Controller {
             let nanos = |time: Duration| i64::try_from(time.as_nanos()).ok();
             format!("NO ANSWER for {}  ", age(nanos(self.now), nanos(since)))
         });
-        let mut story = Table::new("What happened", &[], "nothing yet");
-        story.tail = true;
-        self.lines.iter().for_each(|line| story.push(Tone::Plain, [line.clone()]));
         let mut tables = vec![self.controller_table(&display), self.failure_table()];
         tables.extend(self.watched_table(&display));
-        tables.extend([self.axis_table(&display), self.bus_table(&display), story]);
+        tables.extend([self.axis_table(&display), self.bus_table(&display), self.lines.table("nothing yet")]);
         Sheet { head: format!("{silent}{:.1} s  {}", self.now.as_secs_f64(), self.title), tables }
     }
 
