@@ -28,6 +28,18 @@ impl Time {
     pub fn since_zero(self) -> core::time::Duration {
         core::time::Duration::from_nanos(u64::try_from(self.0).unwrap_or(0))
     }
+
+    /// The time of an engine; the latest that there is for one beyond it.
+    #[must_use]
+    pub fn from_zero(time: core::time::Duration) -> Self {
+        Self(i64::try_from(time.as_nanos()).unwrap_or(i64::MAX))
+    }
+
+    /// Without the part of a microsecond.
+    #[must_use]
+    pub const fn whole_micros(self) -> Self {
+        Self(self.0 / 1000 * 1000)
+    }
 }
 
 /// Seconds with six decimals, nine where six would lose something.

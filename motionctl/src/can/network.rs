@@ -10,10 +10,11 @@ use canopen_master::nmt::{Command, State, Target};
 use canopen_master::trace::Tracer;
 use canopen_master::{NodeId, scan};
 use motion_io::can::{Event as PortEvent, open};
+use motion_io::capture::{Record, Time};
 use serde_json::{Value, json};
 
 use super::cli::{CanLine, Nmt, Stream};
-use super::record::listen;
+use super::record::{listen, recorded};
 use super::session::{Session, endpoint, node_id};
 use super::stop_flag;
 use super::value::hex;
@@ -297,14 +298,13 @@ pub(crate) fn monitor(out: &Output, global: &Global, line: &CanLine, run: &Strea
                 let kind = tracer.handle_frame(Some(now), 0, &frame);
                 while tracer.poll_event().is_some() {}
                 let (name, node) = (kind_name(&kind), node_of(&kind));
-                let (id, extended) = match frame.id() {
-                    embedded_can::Id::Standard(id) => (u32::from(id.as_raw()), false),
-                    embedded_can::Id::Extended(id) => (id.as_raw(), true),
+                let Some(Record { frame: seen, .. }) = recorded(&frame, Time::from_zero(now)) else {
+                    return Ok(());
                 };
                 let document = json!({
                     "t": t,
-                    "id": id,
-                    "ext": extended,
+                    "id": seen.id,
+                    "ext": seen.extended,
                     "rtr": frame.is_remote(),
                     "data": hex(frame.data()),
                     "node": node,

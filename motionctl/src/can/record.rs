@@ -52,7 +52,7 @@ pub(crate) fn recorded(frame: &pdo::Frame, time: Time) -> Option<Record> {
 /// The time of day, to the microsecond.
 fn now() -> Time {
     let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
-    Time(i64::try_from(now.as_nanos() / 1000 * 1000).unwrap_or(i64::MAX))
+    Time::from_zero(now).whole_micros()
 }
 
 /// Listens on an open endpoint, on which nothing is sent, for `limit` or until stopped.

@@ -25,7 +25,7 @@ pub(crate) fn number_of(record: &Record) -> u16 {
 
 /// Time of a transfer's last frame.
 fn ended(transfer: &Transfer) -> Option<Time> {
-    transfer.ended.and_then(|time| i64::try_from(time.as_nanos()).ok()).map(Time)
+    transfer.ended.map(Time::from_zero)
 }
 
 /// Understands frames in their order and has them told.

@@ -41,9 +41,8 @@ impl<'a> Listening<'a> {
     }
 
     fn now(&self) -> Time {
-        let nanos = self.port.now().saturating_sub(self.start).as_nanos();
-        // To the microsecond, as captures have them.
-        Time(i64::try_from(nanos / 1000 * 1000).unwrap_or(i64::MAX))
+        // As captures have them.
+        Time::from_zero(self.port.now().saturating_sub(self.start)).whole_micros()
     }
 }
 

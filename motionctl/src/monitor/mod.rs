@@ -27,6 +27,7 @@ mod poll;
 mod replay;
 mod screen;
 mod sheet;
+mod time;
 mod traffic;
 
 use core::sync::atomic::{AtomicBool, Ordering};

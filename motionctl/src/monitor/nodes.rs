@@ -6,14 +6,11 @@ use canopen_master::trace::{Kind, Outcome, PdoDirection, Tracer, Transfer};
 use canopen_master::{NodeId, ds402};
 use serde_json::{Value, json};
 
-use super::bus::{age, seconds};
 use super::sheet::Tone;
+use super::time::{age, in_ms, is_silent, seconds, since};
 use crate::can::value::hex;
 use crate::decode::names::text;
 use crate::decode::story::{Cycle, Rhythm, Story};
-
-/// A node that has not been heard for so many tenths of its period is silent.
-const SILENT: i64 = 25;
 
 /// An emergency as it was heard.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -286,19 +283,4 @@ impl<'a> View<'a> {
             "sdo": { "transfers": node.transfers, "failed": node.failed },
         })
     }
-}
-
-fn since(now: Option<i64>, then: Option<i64>) -> Option<i64> {
-    now.zip(then).map(|(now, then)| now.saturating_sub(then))
-}
-
-fn in_ms(nanos: i64) -> String {
-    format!("{:.1} ms", nanos as f64 / 1e6)
-}
-
-/// Whether something that came at a period has not come for more than twice of it.
-pub(super) fn is_silent(last: Option<i64>, period: Option<i64>, now: Option<i64>) -> bool {
-    since(now, last)
-        .zip(period)
-        .is_some_and(|(age, period)| period > 0 && age.saturating_mul(10) > period.saturating_mul(SILENT))
 }

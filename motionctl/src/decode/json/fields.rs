@@ -54,7 +54,7 @@ fn put_fields(out: &mut Vec<u8>, kind: &Kind, data: &[u8]) {
             }
             if let Some(interval) = interval {
                 key!(out, "interval");
-                put_time(out, i64::try_from(interval.as_nanos()).ok().map(Time));
+                put_time(out, Some(Time::from_zero(interval)));
             }
         }
         Kind::Time(Some(time)) => {

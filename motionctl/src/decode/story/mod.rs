@@ -121,7 +121,7 @@ impl<'a> Story<'a> {
     /// Seconds, of times of day those since the first frame; to the microsecond.
     fn clock(&self, time: Option<i64>) -> String {
         let since = time.map(|time| time.saturating_sub(self.start.unwrap_or(0)));
-        since.map(|nanos| Time(nanos / 1000 * 1000).to_string()).unwrap_or_default()
+        since.map(|nanos| Time(nanos).whole_micros().to_string()).unwrap_or_default()
     }
 
     fn repeated(&mut self) {

@@ -3,6 +3,7 @@
 use canopen_master::sdo::message::{Content as Carried, Request, Response};
 use canopen_master::trace::{Content, Direction, Mode, Outcome, SdoFrame, Transfer, Way};
 use canopen_master::{Address, ds402};
+use motion_io::capture::Time;
 
 use super::super::names::bytes;
 use super::repeats::Cycle;
@@ -100,7 +101,7 @@ impl Story<'_> {
             }
             Outcome::Incomplete => format!("{verb:<5} {object}: unfinished, {value}{how}"),
         };
-        let ended = transfer.ended.and_then(|time| i64::try_from(time.as_nanos()).ok());
+        let ended = transfer.ended.map(|time| Time::from_zero(time).0);
         // That nothing more came shows later, and is told where it shows.
         let (time, since) = match self.latest.filter(|latest| ended.is_some_and(|ended| ended < *latest)) {
             Some(latest) => {

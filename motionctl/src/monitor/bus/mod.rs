@@ -8,7 +8,6 @@ use canopen_master::NodeId;
 use canopen_master::trace::{Kind, Tracer, Transfer};
 use motion_io::can::BusEvent;
 use motion_io::capture::{FrameKind, Reader, Record, Time};
-use serde_json::{Value, json};
 
 use super::lines::Lines;
 use super::nodes::{Node, sender};
@@ -164,26 +163,12 @@ impl<'a> Buses<'a> {
     }
 }
 
-/// Seconds for JSON, to the microsecond.
-pub(super) fn seconds(nanos: Option<i64>) -> Value {
-    nanos.map_or(Value::Null, |nanos| json!((nanos / 1000) as f64 / 1e6))
-}
-
-/// How long ago something was.
-pub(super) fn age(now: Option<i64>, then: Option<i64>) -> String {
-    let Some(age) = now.zip(then).map(|(now, then)| now.saturating_sub(then)) else { return String::new() };
-    match age as f64 / 1e9 {
-        age if age < 100.0 => format!("{age:.1} s"),
-        age if age < 6000.0 => format!("{:.0} min", age / 60.0),
-        age => format!("{:.0} h", age / 3600.0),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::sheet::Tone;
     use super::*;
     use motion_io::capture::Frame;
+    use serde_json::{Value, json};
 
     const MS: i64 = 1_000_000;
 

@@ -5,10 +5,11 @@ use canopen_master::trace::{Field, Kind};
 use motion_io::can::BusState;
 use serde_json::{Value, json};
 
-use super::super::nodes::{View, is_silent};
+use super::super::nodes::View;
 use super::super::sheet::{Sheet, Table, Tone};
+use super::super::time::{age, in_ms, is_silent, seconds, since};
 use super::super::traffic::{Rate, Traffic};
-use super::{Buses, Watch, age, seconds};
+use super::{Buses, Watch};
 use crate::can::value::hex;
 use crate::decode::counted_kinds;
 use crate::decode::names::bytes;
@@ -101,9 +102,7 @@ impl Buses<'_> {
         let mut table = Table::new("What repeats itself", &columns, "nothing");
         for (cycle, count) in self.watch.story.cycles() {
             let rhythm = count.rhythm;
-            let ms = |nanos: Option<i64>| {
-                nanos.map_or_else(String::new, |nanos| format!("{:.1} ms", nanos as f64 / 1e6))
-            };
+            let ms = |nanos: Option<i64>| nanos.map_or_else(String::new, in_ms);
             let fields = self.values(*cycle, &count.data);
             let last = match fields.is_empty() {
                 _ if !cycle.carries() => String::new(),
@@ -134,7 +133,7 @@ impl Buses<'_> {
     }
 
     fn span(&self) -> Option<i64> {
-        self.now.zip(self.start).map(|(now, start)| now.saturating_sub(start))
+        since(self.now, self.start)
     }
 
     pub(in super::super) fn sheet(&self) -> Sheet {
@@ -191,7 +190,7 @@ impl Buses<'_> {
                 "period": seconds(rhythm.period),
                 "shortest": seconds(rhythm.shortest),
                 "longest": seconds(rhythm.longest),
-                "age": seconds(self.now.zip(rhythm.last).map(|(now, last)| now.saturating_sub(last))),
+                "age": seconds(since(self.now, rhythm.last)),
                 "changes": cycle.carries().then_some(count.changes),
                 "data": cycle.carries().then(|| hex(&count.data)),
                 "values": values.collect::<Vec<_>>(),

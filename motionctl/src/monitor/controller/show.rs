@@ -1,14 +1,13 @@
 //! A controller as tables and as a document.
 
-use core::time::Duration;
-
 use motion_core::AXES;
 use motion_core::bus::{OBJECTS, Object, Role, Settings};
 use motion_core::parameters::{Values, get};
+use motion_io::capture::Time;
 use serde_json::{Value, json};
 
-use super::super::bus::age;
 use super::super::sheet::{Sheet, Table, Tone};
+use super::super::time::age;
 use super::{Controller, Place, source};
 use crate::can::value::{decode, hex};
 use crate::lb2::{Identity, failure_json};
@@ -156,7 +155,7 @@ impl Controller {
     pub(in super::super) fn sheet(&self) -> Sheet {
         let display = self.display();
         let silent = self.silent.map_or_else(String::new, |since| {
-            let nanos = |time: Duration| i64::try_from(time.as_nanos()).ok();
+            let nanos = |time| Some(Time::from_zero(time).0);
             format!("NO ANSWER for {}  ", age(nanos(self.now), nanos(since)))
         });
         let mut tables = vec![self.controller_table(&display), self.failure_table()];
