@@ -5,7 +5,7 @@ use core::time::Duration;
 use canopen_master::master::{BusStatus, Config, Event, Master};
 use canopen_master::sdo::{Options, Outcome};
 use canopen_master::{Address, NodeId};
-use motion_io::can::{BusEvent, BusState, Driver, Engine, Event as PortEvent, open};
+use motion_io::can::{BusEvent, BusState, CanPort, Driver, Engine, Event as PortEvent, open};
 use motion_io::endpoint::CanEndpoint;
 use pdo::Frame;
 use serde_json::{Value, json};
@@ -160,6 +160,15 @@ pub(crate) fn node_id(raw: u8) -> Result<NodeId, Exit> {
     NodeId::new(raw).map_err(|error| Exit::usage(error.to_string()))
 }
 
+/// Opens an endpoint; where we are the adapter, a host has to open its end.
+pub(crate) fn connect(endpoint: &CanEndpoint) -> Result<Box<dyn CanPort>, Exit> {
+    let mut port = open(endpoint).map_err(|error| Exit::trouble(error.to_string()))?;
+    if !port.wait_for_peer(PEER).map_err(|error| gone(&error))? {
+        return Err(Exit::trouble(format!("{endpoint}: nobody has opened the other end")));
+    }
+    Ok(port)
+}
+
 /// The endpoint does not answer any more.
 pub(crate) fn gone(error: &std::io::Error) -> Exit {
     Exit::trouble(format!("the endpoint failed: {error}"))
@@ -169,10 +178,7 @@ impl Session {
     pub(crate) fn open(global: &Global, line: &CanLine) -> Result<Self, Exit> {
         let answer = answer_time(global);
         let endpoint = endpoint(global, line)?;
-        let mut port = open(&endpoint).map_err(|error| Exit::trouble(error.to_string()))?;
-        if !port.wait_for_peer(PEER).map_err(|error| gone(&error))? {
-            return Err(Exit::trouble(format!("{endpoint}: nobody has opened the other end")));
-        }
+        let port = connect(&endpoint)?;
         let mut config = Config {
             confirm: answer,
             lss: canopen_master::lss::Config {

@@ -9,19 +9,15 @@ use canopen_master::eds;
 use clap::Args;
 use conformance::node::{Config, Line, TestError, checks, test};
 use conformance::report::{Case, Outcome, counts, json as report_json, junit};
-use motion_io::can::open;
 use motion_io::endpoint::CanEndpoint;
 use serde_json::json;
 
 use crate::can::cli::CanLine;
-use crate::can::session::{answer_time, endpoint, node_id};
+use crate::can::session::{answer_time, connect, endpoint, gone, node_id};
 use crate::cli::Global;
 use crate::exit::Exit;
 use crate::output::{Output, writable, write_beside};
 use tell::Teller;
-
-/// Where we are the adapter, a host has so long to open its end.
-const PEER: Duration = Duration::from_secs(10);
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct Conform {
@@ -95,14 +91,9 @@ pub(crate) fn run(out: &Output, global: &Global, arguments: &Conform) -> Result<
 }
 
 fn test_over(endpoint: &CanEndpoint, config: &Config<'_>, told: impl FnMut(&Case)) -> Result<(), Exit> {
-    let trouble = |error: std::io::Error| Exit::trouble(format!("{endpoint}: {error}"));
-    let mut port = open(endpoint).map_err(|error| Exit::trouble(error.to_string()))?;
-    if !port.wait_for_peer(PEER).map_err(trouble)? {
-        return Err(Exit::trouble(format!("{endpoint}: nobody has opened the other end")));
-    }
-    match test(&mut Line::new(port), config, told) {
+    match test(&mut Line::new(connect(endpoint)?), config, told) {
         Ok(_) => Ok(()),
-        Err(TestError::Io(error)) => Err(trouble(error)),
+        Err(TestError::Io(error)) => Err(gone(&error)),
         Err(error @ TestError::Silent(_)) => Err(Exit { status: 3, message: error.to_string() }),
         Err(error) => Err(Exit::usage(format!("{error}: --yes gives it"))),
     }
