@@ -6,13 +6,7 @@ mod common;
 mod linmot;
 
 use common::{Bench, edit};
-use linmot::{CARRIERS, CURVE, Linmot, drive};
-
-fn entry(link: u16, name: &str) -> String {
-    let [low, high] = link.to_le_bytes();
-    let name: String = name.bytes().map(|byte| format!("{byte:02X}")).collect();
-    format!("01A7{low:02X}{high:02X}0001{:0<64}{name:0<32}{:0<20}", "", "")
-}
+use linmot::{CARRIERS, CURVE, Linmot, drive, entry};
 
 /// Backup to PVL → factory default → restart → restore → save → restart → compare equal.
 #[test]

@@ -10,7 +10,7 @@ mod troubled;
 
 use common::{Bench, Ran};
 use linmot::code::Command;
-use linmot_drive::{CARRIERS, CURVE, Linmot};
+use linmot_drive::{CARRIERS, CURVE, Linmot, entry};
 use troubled::{Happens, Troubled};
 
 const SETPOINTS: usize = 10;
@@ -42,11 +42,6 @@ fn setpoints(linmot: &Linmot<'_>, id: &str) -> Vec<String> {
     text.lines().skip(1).map(str::to_owned).collect()
 }
 
-fn entry(name: &str) -> String {
-    let name: String = name.bytes().map(|byte| format!("{byte:02X}")).collect();
-    format!("01A7FFFF0001{:0<64}{name:0<32}{:0<20}", "", "")
-}
-
 /// The last word comes twice: the drive has all, and says so.
 #[test]
 fn a_block_that_was_finished_already_is_named() {
@@ -62,7 +57,7 @@ fn a_block_that_was_finished_already_is_named() {
     let script = || nth(Command::WRITE_ENTRY_DATA, 16, Happens::Twice);
     over_every_carrier(script, |linmot, _| {
         linmot
-            .run(&["table", "set", "9", "--raw", &entry("x")])
+            .run(&["table", "set", "9", "--raw", &entry(0xFFFF, "x")])
             .ends(4)
             .says("entry 9 in RAM is there as it was to be: entry 9: command table: write entry data: the drive answered D0h")
             .says("the block was finished already");
@@ -96,7 +91,7 @@ fn a_block_that_ends_early_is_named() {
     let script = || nth(Command::WRITE_ENTRY_DATA, 3, Happens::Twice);
     over_every_carrier(script, |linmot, _| {
         linmot
-            .run(&["table", "set", "9", "--raw", &entry("x")])
+            .run(&["table", "set", "9", "--raw", &entry(0xFFFF, "x")])
             .ends(4)
             .says("entry 9 in RAM is another one than was to be written: ")
             .says("the block's end came after 15 words, 16 expected");
@@ -137,7 +132,7 @@ fn software_that_runs_again_is_named() {
     over_every_carrier(
         || nth(Command::SAVE_TABLE, 1, Happens::Started),
         |linmot, _| {
-            linmot.run(&["table", "set", "9", "--raw", &entry("x")]).ends(0);
+            linmot.run(&["table", "set", "9", "--raw", &entry(0xFFFF, "x")]).ends(0);
             linmot.run(&["table", "save", "--yes"]).ends(4).says(words);
             linmot.run(&["table", "backup", "T.toml"]).ends(0);
             linmot.run(&["restart", "--wait"]).ends(0);
@@ -147,9 +142,9 @@ fn software_that_runs_again_is_named() {
     over_every_carrier(
         || nth(Command::SAVE_TABLE, 1, Happens::Started),
         |linmot, _| {
-            linmot.run(&["table", "set", "9", "--raw", &entry("x")]).ends(0);
+            linmot.run(&["table", "set", "9", "--raw", &entry(0xFFFF, "x")]).ends(0);
             linmot.run(&["table", "backup", "T.toml"]).ends(0);
-            linmot.run(&["table", "set", "8", "--raw", &entry("y")]).ends(0);
+            linmot.run(&["table", "set", "8", "--raw", &entry(0xFFFF, "y")]).ends(0);
             linmot
                 .run(&["--yes", "table", "restore", "T.toml"])
                 .ends(4)

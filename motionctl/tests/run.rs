@@ -7,7 +7,7 @@ mod common;
 use std::io::{BufRead, BufReader, Lines};
 use std::process::{Child, ChildStdout, Command, Stdio};
 
-use common::Bench;
+use common::{Bench, Ran};
 use serde_json::Value;
 
 /// Axis 1: the drive at address 1 on CAN 2. Axis 2: a plant on Q2 and E2.
@@ -131,6 +131,22 @@ impl Drop for Running {
     }
 }
 
+/// Runs a configuration to its end.
+fn run(bench: &Bench, config: &str, more: &[&str]) -> Ran {
+    std::fs::write(bench.path("run.toml"), config).unwrap();
+    bench.run(&[&["run", "run.toml"], more].concat())
+}
+
+/// What `--record run.csv` wrote of an axis under this heading.
+fn recorded(bench: &Bench, axis: &str, heading: &str) -> Vec<f64> {
+    let text = std::fs::read_to_string(bench.path("run.csv")).unwrap();
+    let mut lines = text.lines().map(|line| line.split(',').collect::<Vec<_>>());
+    let headings = lines.next().unwrap();
+    let place = |name: &str| headings.iter().position(|heading| *heading == name).unwrap();
+    let (number, value) = (place("axis"), place(heading));
+    lines.filter(|line| line[number] == axis).map(|line| line[value].parse().unwrap()).collect()
+}
+
 #[test]
 fn a_drive_and_a_plant_are_moved_and_the_jitter_is_told() {
     let bench = Bench::new();
@@ -222,30 +238,19 @@ do = "move-absolute"
 axis = 1
 position = 0
 "#;
-    std::fs::write(bench.path("run.toml"), config).unwrap();
-    let ran = bench.run(&["run", "run.toml", "--for", "2.0", "--record", "run.csv"]).ends(0);
+    let ran = run(&bench, config, &["--for", "2.0", "--record", "run.csv"]).ends(0);
     for words in ["gear-in: done", "synchronized-motion", "gear-out: done"] {
         assert!(ran.stdout().contains(words), "{words:?}: {}", ran.stdout());
     }
-    let recorded = std::fs::read_to_string(bench.path("run.csv")).unwrap();
-    let mut lines = recorded.lines();
-    let names: Vec<&str> = lines.next().unwrap().split(',').collect();
-    let place = |name: &str| names.iter().position(|other| *other == name).unwrap();
-    let (axis, position) = (place("axis"), place("position"));
-    let last = |number: &str| -> f64 {
-        let mut own = recorded.lines().filter(|line| line.split(',').nth(axis) == Some(number));
-        own.next_back().unwrap().split(',').nth(position).unwrap().parse().unwrap()
-    };
-    assert!(last("1").abs() <= 20.0, "back: {}", last("1"));
-    assert!((last("2") + 3_000.0).abs() <= 9.0, "left behind: {}", last("2"));
+    let [back, left] = ["1", "2"].map(|axis| *recorded(&bench, axis, "position").last().unwrap());
+    assert!(back.abs() <= 20.0, "back: {back}");
+    assert!((left + 3_000.0).abs() <= 9.0, "left behind: {left}");
 }
 
 #[test]
 fn the_histogram_is_drawn_for_people() {
     let bench = Bench::new();
-    std::fs::write(bench.path("run.toml"), "[can1]\nendpoint = \"virtual:a\"\n").unwrap();
-    let ran = bench.run(&["run", "run.toml", "--for", "0.1"]).ends(0);
-    let text = ran.stdout();
+    let text = run(&bench, "[can1]\nendpoint = \"virtual:a\"\n", &["--for", "0.1"]).ends(0).stdout();
     let end: Vec<&str> = text.lines().skip_while(|line| !line.contains(" overruns, begun")).collect();
     assert_eq!(end.len(), 12, "{text}");
     assert!(end[1].trim_start().starts_with("<    10 µs") && end[11].contains("more"), "{text}");
@@ -255,10 +260,7 @@ fn the_histogram_is_drawn_for_people() {
 #[test]
 fn what_cannot_run_is_named() {
     let bench = Bench::new();
-    let run = |text: &str| {
-        std::fs::write(bench.path("run.toml"), text).unwrap();
-        bench.run(&["run", "run.toml", "--for", "0.1"])
-    };
+    let run = |text: &str| run(&bench, text, &["--for", "0.1"]);
     run("[parameters]\n642 = 9999999\n").ends(2).says("= 9999999: Value out of range");
     run("[parameters]\n0 = 2\n").ends(2).says("109");
     run("[[simulate]]\nkind = \"drive\"\nbus = \"can1\"\nnode = 1\n").ends(2);
@@ -302,15 +304,9 @@ do = "move-velocity"
 axis = 1
 velocity = 100000
 "#;
-    std::fs::write(bench.path("run.toml"), config).unwrap();
-    let ran = bench.run(&["run", "run.toml", "--for", "0.7", "--record", "run.csv"]).ends(0);
+    let ran = run(&bench, config, &["--for", "0.7", "--record", "run.csv"]).ends(0);
     let ran = ran.says("error-stop").says("upper software limit passed");
-    let recorded = std::fs::read_to_string(bench.path("run.csv")).unwrap();
-    let mut lines = recorded.lines();
-    let names: Vec<&str> = lines.next().unwrap().split(',').collect();
-    let place = names.iter().position(|name| *name == "nominal_velocity").unwrap();
-    let velocities: Vec<f64> =
-        lines.map(|line| line.split(',').nth(place).unwrap().parse().unwrap()).collect();
+    let velocities = recorded(&bench, "1", "nominal_velocity");
     assert!(velocities.contains(&100_000.0));
     assert_eq!(velocities.last(), Some(&0.0));
     // 100 a cycle; what was let go drops to 0 at once.
@@ -380,8 +376,7 @@ fn mistakes_in_a_configuration_are_named() {
     ];
     let mut wrong = Vec::new();
     for (text, words) in cases {
-        std::fs::write(bench.path("run.toml"), text).unwrap();
-        let ran = bench.run(&["run", "run.toml", "--for", "0.05"]);
+        let ran = run(&bench, text, &["--for", "0.05"]);
         let said = ran.stderr();
         let named = words.iter().chain(&["run.toml"]).all(|word| said.contains(word));
         if ran.0.status.code() != Some(2) || !named {
@@ -389,18 +384,16 @@ fn mistakes_in_a_configuration_are_named() {
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
-    std::fs::write(bench.path("run.toml"), "").unwrap();
     for seconds in ["-1", "nan", "1e300"] {
-        bench.run(&["run", "run.toml", &format!("--for={seconds}")]).ends(2).says("--for");
+        run(&bench, "", &[&format!("--for={seconds}")]).ends(2).says("--for");
     }
     bench.run(&["run", "run.toml", "--for", "0.05", "--record", "no/such.csv"]).ends(5).says("no/such.csv");
     std::fs::write(bench.path("run.toml"), [0xFF, 0xFE, 0]).unwrap();
     bench.run(&["run", "run.toml"]).ends(5).says("run.toml");
-    std::fs::write(bench.path("run.toml"), "[controller]\nstate = \"run.toml\"\n").unwrap();
-    bench.run(&["run", "run.toml", "--for", "0.05"]).ends(5).says("run.toml");
+    let state = "[controller]\nstate = \"run.toml\"\n";
+    run(&bench, state, &["--for", "0.05"]).ends(5).says("run.toml");
     let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
     let taken = listener.local_addr().unwrap().to_string();
     let text = format!("[extension]\nkind = \"modbus-tcp\"\nlisten = \"{taken}\"\n");
-    std::fs::write(bench.path("run.toml"), text).unwrap();
-    bench.run(&["run", "run.toml", "--for", "0.05"]).ends(5).says(&taken);
+    run(&bench, &text, &["--for", "0.05"]).ends(5).says(&taken);
 }

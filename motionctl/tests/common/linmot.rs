@@ -38,6 +38,14 @@ impl Linmot<'_> {
     }
 }
 
+/// An entry of the command table in hex, with the entry that follows it: FFFFh is none.
+#[allow(dead_code)] // not in every test program
+pub(crate) fn entry(link: u16, name: &str) -> String {
+    let [low, high] = link.to_le_bytes();
+    let name: String = name.bytes().map(|byte| format!("{byte:02X}")).collect();
+    format!("01A7{low:02X}{high:02X}0001{:0<64}{name:0<32}{:0<20}", "", "")
+}
+
 #[allow(dead_code)] // not in every test program
 pub(crate) fn drive(bench: &Bench, endpoint: &str) -> Controller {
     bench.device(&["sim", "linmot", endpoint, "--state", "FLASH"])
