@@ -5,7 +5,7 @@ use core::time::Duration;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::time::Instant;
 
-use motion_core::parameters::{Entry, find};
+use motion_core::parameters::Entry;
 use motion_io::lb2::{CallError, Client, Remark};
 use serde_json::Value;
 
@@ -19,6 +19,7 @@ use crate::connect::{connect, endpoint};
 use crate::exit::Exit;
 use crate::lb2::Identity;
 use crate::output::Output;
+use crate::params::entry;
 
 /// Failures and RAM are asked for again after so many parameters.
 const STRIDE: usize = 8;
@@ -46,8 +47,7 @@ impl Asking {
         args: &Monitor,
         patient: bool,
     ) -> Result<Self, Exit> {
-        let key = |key: &String| find(key).map_err(|error| Exit::usage(error.to_string()));
-        let watched = args.param.iter().map(key).collect::<Result<Vec<Entry>, _>>()?;
+        let watched = args.param.iter().map(|key| entry(key)).collect::<Result<Vec<Entry>, _>>()?;
         let places = args.ram.iter().map(|text| place(text)).collect::<Result<Vec<_>, _>>()?;
         let title = endpoint(global, line)?.to_string();
         let client = connect(out, global, line)?;

@@ -54,7 +54,8 @@ pub(crate) fn run(out: &Output, global: &Global, command: &Params) -> Result<(),
     }
 }
 
-fn entry(key: &str) -> Result<Entry, Exit> {
+/// The parameter of this number or name.
+pub(crate) fn entry(key: &str) -> Result<Entry, Exit> {
     find(key).map_err(|error| Exit::usage(error.to_string()))
 }
 

@@ -5,13 +5,14 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use motion_core::Model;
-use motion_core::parameters::{Values, find};
+use motion_core::parameters::Values;
 use motion_io::endpoint::{CanEndpoint, Endpoint};
 use serde::Deserialize;
 
 use super::step::Step;
 use crate::cli::above_zero;
 use crate::exit::Exit;
+use crate::params::entry;
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -354,35 +355,25 @@ impl Config {
 
     /// Nothing is on a place where something else is.
     fn check_wires(&self) -> Result<(), Exit> {
-        let twice = |what: &str| Err(Exit::usage(format!("{what} is there twice")));
-        let mut ends = Vec::new();
-        for (at, serial) in self.serial.iter().enumerate() {
-            if self.serial.iter().take(at).any(|other| other.port == serial.port) {
-                return twice(&format!("[[serial]] port {:?}", serial.port));
-            }
-            ends.push(serial.endpoint()?.to_string());
+        let mut places = Vec::new();
+        for serial in &self.serial {
+            places.push(format!("[[serial]] port {:?}", serial.port));
+            places.push(format!("endpoint {:?}", serial.endpoint()?.to_string()));
         }
         for can in [&self.can1, &self.can2].into_iter().flatten() {
-            let endpoint = can.endpoint()?;
             // An adapter serves one bus; networks may be on one wire.
-            if let CanEndpoint::Slcan { .. } | CanEndpoint::SlcanPty { .. } = endpoint {
-                ends.push(can.endpoint.clone());
+            if let CanEndpoint::Slcan { .. } | CanEndpoint::SlcanPty { .. } = can.endpoint()? {
+                places.push(format!("endpoint {:?}", can.endpoint));
             }
         }
-        if let Some(end) =
-            ends.iter().enumerate().find(|(at, end)| ends.iter().take(*at).any(|one| one == *end))
-        {
-            return twice(&format!("endpoint {:?}", end.1));
-        }
-        let place = |device: &Simulated| match device {
+        places.extend(self.simulate.iter().map(|device| match device {
             Simulated::Drive { bus, node } | Simulated::Io { bus, node } => {
-                format!("node {node} on {bus:?}")
+                format!("[[simulate]] node {node} on {bus:?}")
             }
-            Simulated::Plant(plant) => format!("plant on block {}", plant.block),
-        };
-        let places: Vec<_> = self.simulate.iter().map(place).collect();
+            Simulated::Plant(plant) => format!("[[simulate]] plant on block {}", plant.block),
+        }));
         match places.iter().enumerate().find(|(at, one)| places.iter().take(*at).any(|other| other == *one)) {
-            Some((_, place)) => twice(&format!("[[simulate]] {place}")),
+            Some((_, place)) => Err(Exit::usage(format!("{place} is there twice"))),
             None => Ok(()),
         }
     }
@@ -401,7 +392,7 @@ impl Config {
             list.push((5, i32::from(number)));
         }
         for (key, value) in &self.parameters {
-            let entry = find(key).map_err(|error| Exit::usage(error.to_string()))?;
+            let entry = entry(key)?;
             let value = match value {
                 Setting::Number(number) => *number,
                 Setting::Text(text) => {
