@@ -19,7 +19,8 @@ pub const HW_LIMIT_MINUS: Failure = Failure(0x80);
 pub const READING_LOST: Failure = Failure(100);
 /// An actual value jumped by more than `[184]` and stayed there for more than `[191]` cycles (6.6.1).
 pub const ACTUAL_VALUE_JUMP: Failure = Failure(101);
-/// A drive on a CAN bus does not answer its guarding any more (6.5.1.1).
+/// A drive on a CAN bus does not answer its guarding any more (6.5.1.1), or other parameters have taken it
+/// from its axis.
 pub const DRIVE_LOST: Failure = Failure(102);
 /// A drive on a CAN bus reports a fault.
 pub const DRIVE_FAULT: Failure = Failure(103);

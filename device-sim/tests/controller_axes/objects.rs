@@ -5,7 +5,9 @@ use core::time::Duration;
 use canopen_master::ds402;
 use device_sim::can::Faults;
 use lb2::device::Device;
+use motion_core::Reset;
 use motion_core::application::{Order, State};
+use motion_core::failure::DRIVE_LOST;
 
 use super::rig::{AXES, Rig, V_MAX};
 
@@ -111,5 +113,65 @@ fn parameters_261_and_492_are_the_ld_2000() {
         rig.until("at rest", |rig| rig.status(axis).position == 1 << 16);
         assert_eq!(rig.real(axis).floor(), 65_536.0, "one turn");
         assert_eq!(rig.status(axis).state, State::Standstill);
+    }
+}
+
+/// Parameters change in mid-move so that an output loses its drive; what the drive then is.
+fn loses_its_drive(axis: usize, change: impl Fn(&mut Rig)) -> Rig {
+    let mut rig = Rig::enabled(&[]);
+    rig.order(axis, Order::MoveVelocity { velocity: 327_680 });
+    rig.run(Duration::from_secs(1));
+    assert!(rig.drive(axis, |drive| drive.motion().1) > 0.0);
+    change(&mut rig);
+    rig.cycle();
+    rig.run(Duration::from_millis(500));
+    assert_eq!(rig.state(axis), ds402::State::SwitchOnDisabled, "axis {axis}");
+    assert_eq!(rig.drive(axis, |drive| drive.motion().1), 0.0, "axis {axis}");
+    rig
+}
+
+fn set(rig: &mut Rig, index: u16, value: i32) {
+    assert!(!rig.controller.write_parameter(index, value).code.is_error());
+    assert_eq!(rig.controller.call_loader(), -1);
+}
+
+#[test]
+fn a_drive_whose_output_is_taken_away_in_mid_move_stops_and_the_axis_fails() {
+    for (axis, choice) in OBJECT.into_iter().enumerate() {
+        let (at, object) = (axis as u16, choice as u16 - 1);
+        // Address and type of the object OUT.
+        let (address, kind) =
+            if object < 2 { (314 + object, 330 + object) } else { (344 + object, 360 + object) };
+        let changes = [(450 + at, 0), (486 + at, 0), (address, 12), (kind, 0)];
+        for (index, value) in changes {
+            let mut rig = loses_its_drive(axis, |rig| {
+                set(rig, index, value);
+                rig.cycle();
+                rig.assert_failed(axis, DRIVE_LOST);
+            });
+            for other in (0..AXES).filter(|other| *other != axis) {
+                assert_eq!(rig.state(other), ds402::State::OperationEnabled, "[{index}]: axis {other}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_reset_to_factory_defaults_in_mid_move_stops_the_drives() {
+    for axis in 0..AXES {
+        loses_its_drive(axis, |rig| rig.controller.reset(Reset::Factory).unwrap());
+    }
+}
+
+/// A drive that keeps its object takes no notice of what becomes of others.
+#[test]
+fn other_drives_move_on_when_an_output_is_taken_away() {
+    let mut rig = Rig::enabled(&[]);
+    rig.order(1, Order::MoveVelocity { velocity: 327_680 });
+    rig.run(Duration::from_secs(1));
+    set(&mut rig, 450, 0);
+    for _ in 0..50 {
+        rig.cycle();
+        assert_eq!(rig.state(1), ds402::State::OperationEnabled);
     }
 }

@@ -59,7 +59,7 @@ impl Drive {
     }
 
     /// What it showed last counts no more, nor what was asked of it.
-    fn forget(&mut self) {
+    pub(super) fn forget(&mut self) {
         (self.enable, self.faulty) = (false, false);
         self.control = ds402::Axis::default();
     }

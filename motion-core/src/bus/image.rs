@@ -48,6 +48,13 @@ impl Image {
         true
     }
 
+    /// What waits to be sent is not.
+    pub(super) fn withdraw(&mut self, place: usize) {
+        if let Some(due) = self.due.get_mut(place) {
+            *due = false;
+        }
+    }
+
     pub(super) fn receive(&mut self, place: usize, data: Payload) {
         if let (Some(input), Some(fresh)) = (self.inputs.get_mut(place), self.fresh.get_mut(place)) {
             *input = data;

@@ -20,9 +20,9 @@ use canopen_master::master::{BusStatus, Event, Master};
 use canopen_master::scan::{self, BusState};
 use canopen_master::sdo::Small;
 use canopen_master::slave::Event as SlaveEvent;
-use canopen_master::{NodeSet, emcy, guarding, nmt, sync};
+use canopen_master::{NodeSet, ds402, emcy, guarding, nmt, sync};
 use lb2::code::Failure;
-use pdo::layout::ld2000::{DEFAULT_RPDO, DEFAULT_TPDO};
+use pdo::layout::ld2000::{self, DEFAULT_RPDO, DEFAULT_TPDO};
 use pdo::{Frame, Handled, NodeId, Payload};
 
 use crate::control::DriveInputs;
@@ -94,6 +94,8 @@ pub struct CanBus {
     engine: Engine,
     image: Image,
     drives: [Drive; 2 * OBJECTS],
+    /// Last words to drives that no object OUT is for any more.
+    farewells: [Option<Frame>; OBJECTS],
     /// Nodes that have booted.
     ready: NodeSet,
     /// Nodes that were found and are to boot.
@@ -125,6 +127,7 @@ impl CanBus {
             engine,
             image: Image::default(),
             drives: Default::default(),
+            farewells: [None; OBJECTS],
             ready: NodeSet::EMPTY,
             to_boot: NodeSet::EMPTY,
             now: Duration::ZERO,
@@ -157,12 +160,47 @@ impl CanBus {
 
     /// Takes over the objects. Master or slave, and CAN Link, are effective after switching on (6.5.1);
     /// new objects take part after a scan (4.3.4.4).
-    pub fn configure(&mut self, values: &Values) {
+    ///
+    /// A drive whose object OUT goes or becomes another one is stopped (project-defined); by place, whether
+    /// it had one.
+    pub fn configure(&mut self, values: &Values) -> [bool; OBJECTS] {
         let settings = Settings::read(values, self.at);
-        if settings != self.settings {
-            self.settings = settings;
-            self.drives = Default::default();
+        let mut left = [false; OBJECTS];
+        let objects = self.settings.outputs.into_iter().zip(settings.outputs).enumerate();
+        for ((place, (before, after)), left) in objects.zip(&mut left) {
+            if before != after {
+                self.image.withdraw(place);
+                *left = before.is_some_and(|object| self.leave(place, object));
+            }
         }
+        // Drives that keep an object are what they were.
+        let mut drives: [Drive; 2 * OBJECTS] = Default::default();
+        for (object, drive) in settings.inputs.into_iter().chain(settings.outputs).zip(&mut drives) {
+            if let Some(object) = object.filter(|object| object.kind == Kind::Axis)
+                && let Some(before) = self.drive_mut(object.node)
+            {
+                *drive = core::mem::take(before);
+            }
+        }
+        (self.settings, self.drives) = (settings, drives);
+        left
+    }
+
+    /// Lets go of the drive behind an object OUT: quick stop, which ends with its output stage off. Whether
+    /// there was one.
+    fn leave(&mut self, place: usize, object: Object) -> bool {
+        if object.kind != Kind::Axis || !self.ready.contains(object.node) {
+            return false;
+        }
+        if let Some(drive) = self.drive_mut(object.node) {
+            drive.forget();
+        }
+        let stop = ld2000::Command { control_word: ds402::Command::QuickStop.bits(), speed: 0 };
+        let id = embedded_can::StandardId::new(object.id(self.role, false));
+        if let Some(slot) = self.farewells.get_mut(place) {
+            *slot = id.map(|id| stop.encode().frame(id));
+        }
+        true
     }
 
     /// Process data of the objects.
@@ -333,6 +371,9 @@ impl CanBus {
 
     /// The next frame to send, until `None`.
     pub fn poll_transmit(&mut self, now: Duration) -> Option<Frame> {
+        if let Some(farewell) = self.farewells.iter_mut().find_map(Option::take) {
+            return Some(farewell);
+        }
         if self.is_operational() {
             while let Some((place, data)) = self.image.take_due() {
                 let object = self.settings.outputs.get(place).copied().flatten();

@@ -12,6 +12,7 @@ use lb2::code::{Failure, StoredFailure};
 use crate::Model;
 use crate::application::{Application, AxisAccess, AxisStatus, Plc, Progress};
 use crate::bus::CanBus;
+use crate::failure;
 use crate::input::{self, ActualValue, ActualValueInput, AxisQuantities, Kind, Reading, Sources};
 use crate::io::{
     AnalogInputs, DigitalInputs, DigitalOutputs, FieldBus, Inputs, Outputs, ProcessImage, Pwm, Terminal,
@@ -59,6 +60,8 @@ pub struct Control<A> {
     quantities: [AxisQuantities; COUNT],
     /// Whether an axis waits for its reference point, by axis.
     armed: [bool; COUNT],
+    /// Whether an axis has lost its drive to other parameters, by axis: until the next cycle.
+    lost: [bool; COUNT],
     /// What SetPosition moved on axes that have no actual value input.
     shifts: [i32; COUNT],
     /// Steps at position 0 of axes whose actual value is a stepper motor's clock.
@@ -90,6 +93,7 @@ impl<A: AxisControl + Default> Control<A> {
             access: Default::default(),
             quantities: Default::default(),
             armed: [false; COUNT],
+            lost: [false; COUNT],
             shifts: [0; COUNT],
             origins: [0; COUNT],
             outputs: core::array::from_fn(|at| {
@@ -121,6 +125,16 @@ impl<A: AxisControl> Control<A> {
         }
         for (access, route) in self.access.iter_mut().zip(&self.settings.axes) {
             access.activated = route.is_some();
+        }
+    }
+
+    /// The drives behind these objects OUT, by place, are not there any more: an enabled axis that has one
+    /// fails in the next cycle.
+    pub fn lose_drives(&mut self, drives: &[bool; DRIVES]) {
+        let axes = self.settings.axes.iter().zip(&self.access);
+        for (lost, (route, access)) in self.lost.iter_mut().zip(axes) {
+            let drive = route.and_then(AxisRoute::writes);
+            *lost |= access.power && drive.and_then(|drive| drives.get(drive)) == Some(&true);
         }
     }
 
@@ -209,7 +223,11 @@ impl<A: AxisControl> Control<A> {
                 reset: core::mem::take(&mut access.reset),
                 order: access.take(),
                 stop,
-                failure: route.failure(drives),
+                failure: if self.lost.get_mut(at).is_some_and(core::mem::take) {
+                    Some(failure::DRIVE_LOST)
+                } else {
+                    route.failure(drives)
+                },
             };
             let output = axis.cycle(&input, &self.values);
             let number = at as u8 + 1;

@@ -24,6 +24,11 @@ impl AxisRoute {
         matches!(self.source, ActualSource::Input(own) if usize::from(own) == input)
     }
 
+    /// Object OUT of the drive that its output has, by place.
+    pub(super) const fn writes(self) -> Option<usize> {
+        self.drives.1
+    }
+
     /// What failed of its drives.
     pub(super) fn failure(self, inputs: &DriveInputs) -> Option<Failure> {
         let (reads, writes) = self.drives;

@@ -16,7 +16,7 @@ use lb2::telegram::{BANK_LEN, MAX_FAILURES};
 use crate::application::{Application, AxisAccess, AxisStatus};
 use crate::axis::Axis;
 use crate::bus::CanBus;
-use crate::control::{Control, DriveInputs};
+use crate::control::{Control, DRIVES, DriveInputs};
 use crate::failure::FailureLog;
 use crate::input::ActualValue;
 use crate::io::{FieldBus, Inputs, Outputs};
@@ -207,10 +207,13 @@ impl<S: Storage, R: AsRef<[u8]> + AsMut<[u8]>> Controller<S, R> {
     /// Makes the edited parameters effective.
     fn take_over(&mut self) {
         self.working = self.edited.clone();
-        self.control.configure(&self.working);
-        for bus in &mut self.buses {
-            bus.configure(&self.working);
+        let mut left = [false; DRIVES];
+        for (bus, places) in self.buses.iter_mut().zip(PLACES) {
+            let of_bus = left.iter_mut().skip(places.start).take(places.len());
+            of_bus.zip(bus.configure(&self.working)).for_each(|(to, from)| *to = from);
         }
+        self.control.lose_drives(&left);
+        self.control.configure(&self.working);
         // Another type of input sets its offset back.
         self.retain = true;
     }
