@@ -3,6 +3,7 @@
 use core::fmt;
 
 use crate::data_type::{DataType, Kind};
+use crate::od::Rights;
 
 /// Kind of an object (CiA 301, 7.4.3, "object code").
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -123,25 +124,42 @@ words! {
 }
 
 impl Access {
+    /// What it allows.
+    #[must_use]
+    pub const fn rights(self) -> Rights {
+        match self {
+            Self::ReadOnly => Rights::Ro,
+            Self::WriteOnly => Rights::Wo,
+            Self::ReadWrite => Rights::Rw,
+            Self::ReadWriteInput => Rights::Rwr,
+            Self::ReadWriteOutput => Rights::Rww,
+            Self::Const => Rights::Const,
+        }
+    }
+
+    /// How a file says that these are the rights.
+    #[must_use]
+    pub const fn of(rights: Rights) -> Self {
+        match rights {
+            Rights::Ro => Self::ReadOnly,
+            Rights::Wo => Self::WriteOnly,
+            Rights::Rw => Self::ReadWrite,
+            Rights::Rwr => Self::ReadWriteInput,
+            Rights::Rww => Self::ReadWriteOutput,
+            Rights::Const => Self::Const,
+        }
+    }
+
     /// Whether SDO may read it.
     #[must_use]
     pub const fn can_read(self) -> bool {
-        !matches!(self, Self::WriteOnly)
+        self.rights().can_read()
     }
 
     /// Whether SDO may write it.
     #[must_use]
     pub const fn can_write(self) -> bool {
-        !matches!(self, Self::ReadOnly | Self::Const)
-    }
-
-    /// Whether a value that may be mapped goes into RPDOs (`receive`) or TPDOs.
-    pub(crate) const fn goes_into(self, receive: bool) -> bool {
-        match self {
-            Self::ReadWrite => true,
-            Self::ReadOnly | Self::Const | Self::ReadWriteInput => !receive,
-            Self::WriteOnly | Self::ReadWriteOutput => receive,
-        }
+        self.rights().can_write()
     }
 }
 

@@ -74,7 +74,7 @@ const fn says(access: Option<Access>, mapping: PdoMapping) -> bool {
 }
 
 const fn goes_only(access: Option<Access>, receive: bool) -> bool {
-    matches!(access, Some(access) if access.goes_into(receive) && !access.goes_into(!receive))
+    matches!(access, Some(access) if access.rights().can_map(receive) && !access.rights().can_map(!receive))
 }
 
 pub(super) fn put_section(text: &mut String, section: &Section, end: &str) {

@@ -135,14 +135,7 @@ fn describe(index: u16, sub: u8, object: &objects::Entry) -> Entry {
     entry.object_type =
         if object.data_type == DataType::DOMAIN { ObjectType::DOMAIN } else { ObjectType::VAR };
     entry.data_type = Some(object.data_type);
-    entry.access = Some(match object.rights {
-        Rights::Ro => Access::ReadOnly,
-        Rights::Wo => Access::WriteOnly,
-        Rights::Rw => Access::ReadWrite,
-        Rights::Rwr => Access::ReadWriteInput,
-        Rights::Rww => Access::ReadWriteOutput,
-        Rights::Const => Access::Const,
-    });
+    entry.access = Some(Access::of(object.rights));
     entry.pdo_mapping = Some(if object.mappable { PdoMapping::Optional } else { PdoMapping::No });
     if let Some(limits) = object.limits {
         (entry.low_limit, entry.high_limit) = (Some(limits.low.to_string()), Some(limits.high.to_string()));

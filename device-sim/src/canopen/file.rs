@@ -5,7 +5,7 @@ use canopen_master::eds::{self, Access};
 use canopen_master::lss::Identity;
 use canopen_master::od::Limits;
 use pdo::mapping::Entry as Mapped;
-use pdo::{Address, CobId, NodeId, Transmission};
+use pdo::{Address, CobId, NodeId, Payload, Transmission};
 
 use super::common::{MAPPED, OFF, Slot, objects};
 use super::objects::{Entry, Objects};
@@ -72,9 +72,7 @@ fn value(entry: &eds::Entry, node: Option<u8>) -> Option<Vec<u8>> {
 /// parameters of PDO 0.
 fn slot(device: &eds::Device, index: u16, number: u16, node: Option<u8>) -> Slot {
     const MAPPING: u16 = 0x200;
-    let read = |entry: &eds::Entry, node| {
-        Some(value(entry, node)?.iter().take(4).rev().fold(0, |value, &byte| value << 8 | u32::from(byte)))
-    };
+    let read = |entry: &eds::Entry, node| Some(Payload::from_slice(&value(entry, node)?).word() as u32);
     let number_at = |index, sub| read(device.entry(index + number, sub)?, node);
     let mut slot = OFF;
     let own = &mut slot.communication;
@@ -114,7 +112,7 @@ fn add(
     }
     let data_type = entry.data_type.map_or(DataType::DOMAIN, |own| DataType(device.base_type(own).0));
     let value = value(entry, node);
-    let rights = rights(entry.access);
+    let rights = entry.access.map_or(Rights::Ro, Access::rights);
     let mut new = match data_type.size() {
         Some(_) => Entry::number(data_type, rights, 0),
         None => Entry { data_type, rights, ..Entry::domain(LONGEST) },
@@ -133,17 +131,6 @@ fn add(
         new.limits = Some(Limits { low, high });
     }
     objects.insert(index, sub, new);
-}
-
-fn rights(access: Option<Access>) -> Rights {
-    match access {
-        Some(Access::ReadOnly) | None => Rights::Ro,
-        Some(Access::WriteOnly) => Rights::Wo,
-        Some(Access::ReadWrite) => Rights::Rw,
-        Some(Access::ReadWriteInput) => Rights::Rwr,
-        Some(Access::ReadWriteOutput) => Rights::Rww,
-        Some(Access::Const) => Rights::Const,
-    }
 }
 
 impl Device for FileNode {

@@ -73,7 +73,7 @@ fn one(device: &Device, mapped: u32, receive: bool) -> Result<(), alloc::string:
         PdoMapping::Rpdo if !receive => return Err("its PDOMapping allows RPDOs only".into()),
         _ => {}
     }
-    if let Some(access) = entry.access.filter(|access| !access.goes_into(receive)) {
+    if let Some(access) = entry.access.filter(|access| !access.rights().can_map(receive)) {
         return Err(format!(
             "its access is {access}, which goes into {} only",
             if receive { "TPDOs" } else { "RPDOs" }
