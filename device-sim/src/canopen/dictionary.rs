@@ -3,7 +3,7 @@
 use canopen_master::data_type::DataType;
 use canopen_master::od::{LOAD, ProcessData, SAVE};
 use canopen_master::sdo::{AbortCode, Access, Piece, Total, read_slice};
-use pdo::Address;
+use pdo::{Address, Payload};
 
 use super::Device;
 use super::objects::{Entry, Objects};
@@ -95,7 +95,7 @@ impl<D: Device> ProcessData for Dictionary<D> {
 
     fn bits(&self, at: Address) -> u64 {
         let value = self.objects.entry(at).map_or(&[][..], |entry| &entry.value);
-        value.iter().take(8).rev().fold(0, |bits, byte| bits << 8 | u64::from(*byte))
+        Payload::from_slice(value).word()
     }
 
     fn set_bits(&mut self, at: Address, bits: u64) {

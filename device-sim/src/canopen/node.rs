@@ -6,16 +6,13 @@ use canopen_master::lss::{self, BitTiming, Identity};
 use canopen_master::nmt::State;
 use canopen_master::slave::{Config, Event, Slave};
 use canopen_master::{guarding, heartbeat, od};
-use pdo::{Address, CobId, Communication, Frame, NodeId, Payload, Transmission, cob};
+use pdo::{Address, CobId, Communication, DefaultPdo, Frame, NodeId, Payload, Service, Transmission};
 
 use super::common::{MAPPED, PDOS, Slot};
 use super::dictionary::Dictionary;
 use super::objects::Objects;
 use super::{Context, Device, Error, Pdos};
 use crate::can;
-
-/// The identifier in a COB-ID.
-const IDENTIFIER: u32 = 0x1FFF_FFFF;
 
 /// What a node is set to before it starts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -161,11 +158,9 @@ impl<D: Device> Node<D> {
 
     /// Remembers what a TPDO carries.
     fn sends(&mut self, frame: &Frame) {
-        let id = frame.standard_id();
         let slots = self.slave.objects().pdos.tpdo_slots();
         for (slot, sent) in slots.iter().zip(&mut self.sent) {
-            let CobId(own) = slot.communication.cob_id;
-            if id == Some(own as u16 & 0x7FF) {
+            if frame.standard_id() == slot.communication.cob_id.standard_id() {
                 *sent = Some(Payload::from_slice(frame.data()));
             }
         }
@@ -256,7 +251,7 @@ impl<D: Device> Node<D> {
 impl<D: Device> can::Node for Node<D> {
     fn handle_frame(&mut self, now: Duration, frame: &Frame) {
         self.start(now);
-        let asked = self.node().map(|node| cob::SDO_REQUEST + u16::from(node.raw()));
+        let asked = self.node().map(|node| Service::SdoRequest(node).id());
         if self.is_operational() || frame.standard_id() == asked {
             self.with(now, Device::update);
         }
@@ -304,36 +299,35 @@ impl Image {
     /// What depends on the address: identifiers of the predefined connection set, where the objects do not
     /// say otherwise, and the drive's own object of it.
     fn follow(&mut self, node: NodeId) {
-        let id = u32::from(node.raw());
-        self.objects.set(0x1014, 0, i128::from(u32::from(cob::EMCY) + id));
-        self.objects.set(0x100B, 0, i128::from(id));
-        self.identifiers(node, |cob_id, predefined| match cob_id & IDENTIFIER {
-            0 => cob_id | predefined,
+        self.objects.set(0x1014, 0, i128::from(Service::Emcy(node).id()));
+        self.objects.set(0x100B, 0, i128::from(node.raw()));
+        self.identifiers(node, |cob_id, predefined| match cob_id.id() {
+            0 => CobId(cob_id.0 | predefined),
             _ => cob_id,
         });
     }
 
     /// The opposite of [`follow`](Self::follow), so that what is kept goes on to follow the address.
     fn leave(&mut self, node: NodeId) {
-        self.identifiers(node, |cob_id, predefined| match cob_id & IDENTIFIER {
-            own if own == predefined => cob_id & !IDENTIFIER,
+        self.identifiers(node, |cob_id, predefined| match cob_id.id() {
+            own if own == predefined => CobId(cob_id.0 & !own),
             _ => cob_id,
         });
     }
 
     /// Changes the identifiers of all PDOs; `change` gets one and that of the predefined connection set.
-    fn identifiers(&mut self, node: NodeId, change: impl Fn(u32, u32) -> u32) {
-        let id = u32::from(node.raw());
-        for (number, offset) in (0..PDOS).zip((0..).step_by(0x100)) {
-            let changed = |slot: &Slot, base: u32| {
-                let CobId(own) = slot.communication.cob_id;
-                let cob_id = CobId(change(own, base + offset + id));
+    fn identifiers(&mut self, node: NodeId, change: impl Fn(CobId, u32) -> CobId) {
+        for (number, pdo) in DefaultPdo::ALL.into_iter().enumerate() {
+            let changed = |slot: &Slot, predefined: Service| {
+                let cob_id = change(slot.communication.cob_id, predefined.id().into());
                 Slot { communication: Communication { cob_id, ..slot.communication }, ..*slot }
             };
-            if let Some(slot) = self.pdos.rpdo_slots().get(number).map(|slot| changed(slot, 0x200)) {
+            let rpdo = self.pdos.rpdo_slots().get(number).map(|slot| changed(slot, Service::Rpdo(pdo, node)));
+            let tpdo = self.pdos.tpdo_slots().get(number).map(|slot| changed(slot, Service::Tpdo(pdo, node)));
+            if let Some(slot) = rpdo {
                 self.pdos.set_rpdo_slot(number, slot);
             }
-            if let Some(slot) = self.pdos.tpdo_slots().get(number).map(|slot| changed(slot, 0x180)) {
+            if let Some(slot) = tpdo {
                 self.pdos.set_tpdo_slot(number, slot);
             }
         }

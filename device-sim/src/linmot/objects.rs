@@ -10,7 +10,7 @@ use canopen_master::slave::Objects;
 use linmot::drive::Module;
 use linmot::module::{RPDO, TPDO};
 use linmot::sdo::{self, Answer, Server};
-use pdo::{Address, Frame, Handled, NodeId};
+use pdo::{Address, Frame, Handled, NodeId, Payload};
 
 use super::VirtualDrive;
 
@@ -133,7 +133,7 @@ impl DriveObjects {
 }
 
 fn little_endian(data: &[u8]) -> u32 {
-    data.iter().rev().fold(0, |value, byte| value << 8 | u32::from(*byte))
+    Payload::from_slice(data).word() as u32
 }
 
 impl Access for DriveObjects {
