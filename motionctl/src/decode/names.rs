@@ -6,7 +6,7 @@ use canopen_master::data_type::{DataType, Value};
 use canopen_master::ds402::{Command, ControlWord, Mode, StatusWord};
 use canopen_master::eds::{self, Device};
 use canopen_master::trace::{Mapped, Tracer};
-use canopen_master::{Address, NodeId, ds402};
+use canopen_master::{Address, NodeId, ds402, od};
 use pdo::CobId;
 
 use super::linmot;
@@ -235,8 +235,8 @@ fn special(at: Address, data: &[u8]) -> Option<String> {
             let value = u32()?;
             format!("node {} within {} ms", value >> 16 & 0xFF, value & 0xFFFF)
         }
-        (0x1010, 1..) if data == b"save" => "\"save\"".into(),
-        (0x1011, 1..) if data == b"load" => "\"load\"".into(),
+        (0x1010, 1..) if data == od::SAVE => "\"save\"".into(),
+        (0x1011, 1..) if data == od::LOAD => "\"load\"".into(),
         (0x1005 | 0x1012 | 0x1014, 0) | (0x1400..=0x15FF | 0x1800..=0x19FF, 1) => {
             let cob = CobId(u32()?);
             let off = if cob.is_valid() || at.index == 0x1005 { "" } else { ", switched off" };

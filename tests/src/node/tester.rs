@@ -10,7 +10,7 @@ use canopen_master::sdo::message::{Request, Response};
 use canopen_master::sdo::{AbortCode, Channel, Client, Options, Outcome};
 use canopen_master::{Address, NodeId};
 use embedded_can::Frame as _;
-use pdo::{Frame, Service, cob};
+use pdo::{Frame, Payload, Service, cob};
 
 use super::words::{asked, bytes, coded, said};
 use super::{Config, Problem, fail, skip};
@@ -346,7 +346,7 @@ impl<'a> Tester<'a> {
 
 /// A little-endian number of up to 8 bytes.
 pub(super) fn number(data: &[u8]) -> u64 {
-    data.iter().take(8).rev().fold(0, |value, byte| value << 8 | u64::from(*byte))
+    Payload::from_slice(data).word()
 }
 
 pub(super) fn reads(entry: &Entry) -> bool {

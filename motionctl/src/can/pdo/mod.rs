@@ -7,6 +7,7 @@ use std::path::Path;
 use canopen_master::eds::{self, ConciseEntry};
 use canopen_master::sdo::Outcome;
 use canopen_master::{Address, NodeId};
+use pdo::Payload;
 use pdo::mapping::{Entry, MAX_ENTRIES};
 use serde_json::{Value, json};
 
@@ -53,15 +54,13 @@ impl Access<'_> {
     fn read(&mut self, index: u16, sub: u8) -> Result<u32, Exit> {
         let read = self.session.upload(self.node, Address::new(index, sub), false)?;
         let (data, _) = read.map_err(|error| tell(self.out, error))?;
-        Ok(data.iter().take(4).rev().fold(0, |value, byte| value << 8 | u32::from(*byte)))
+        Ok(Payload::from_slice(&data).word() as u32)
     }
 
     /// An object that a device need not have.
     fn read_optional(&mut self, index: u16, sub: u8) -> Result<Option<u32>, Exit> {
         match self.session.upload(self.node, Address::new(index, sub), false)? {
-            Ok((data, _)) => {
-                Ok(Some(data.iter().take(4).rev().fold(0, |value, byte| value << 8 | u32::from(*byte))))
-            }
+            Ok((data, _)) => Ok(Some(Payload::from_slice(&data).word() as u32)),
             Err(error) if matches!(error.outcome, Outcome::Aborted(_)) => Ok(None),
             Err(error) => Err(tell(self.out, error)),
         }
