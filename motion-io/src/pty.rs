@@ -24,12 +24,14 @@ pub(crate) struct Pty {
     _other: OwnedFd,
     other_path: PathBuf,
     link: PathBuf,
+    _claim: Option<Claim>,
 }
 
 impl Pty {
-    /// Makes a raw pseudo-terminal and links its other end at `link`. A symbolic link that is there
-    /// is replaced, anything else is not touched.
+    /// Makes a raw pseudo-terminal and links its other end at `link`. A symbolic link that is there, left by a
+    /// program that was killed, is replaced; one whose program runs, and anything else, is not touched.
     pub(crate) fn create(link: &Path) -> io::Result<Self> {
+        let claim = claim(link)?;
         let end = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)?;
         grantpt(&end)?;
         unlockpt(&end)?;
@@ -46,7 +48,7 @@ impl Pty {
         match link.symlink_metadata() {
             Ok(found) if found.is_symlink() => std::fs::remove_file(link)?,
             Ok(_) => {
-                let text = "the link's path is taken by a file that is no symbolic link";
+                let text = "taken by a file that is no link to a terminal";
                 return Err(io::Error::other(text));
             }
             Err(_) => {}
@@ -54,8 +56,53 @@ impl Pty {
         // A full line must not hold the writer for ever.
         rustix::io::ioctl_fionbio(&end, true)?;
         std::os::unix::fs::symlink(&other_path, link)?;
-        Ok(Self { end: File::from(end), _other: other, other_path, link: link.to_path_buf() })
+        Ok(Self { end: File::from(end), _other: other, other_path, link: link.to_path_buf(), _claim: claim })
     }
+}
+
+/// The right to a link, which ends with the program that has it however that ends: a socket whose name stands for
+/// the link's place. The number of a terminal does not tell, as the system gives it to the next one.
+#[cfg(target_os = "linux")]
+type Claim = std::os::unix::net::UnixDatagram;
+
+#[cfg(target_os = "linux")]
+fn claim(link: &Path) -> io::Result<Option<Claim>> {
+    use std::hash::{DefaultHasher, Hash as _, Hasher as _};
+    use std::os::linux::net::SocketAddrExt as _;
+    use std::os::unix::fs::MetadataExt as _;
+    use std::os::unix::net::SocketAddr;
+
+    let directory = directory(link)?;
+    let mut hasher = DefaultHasher::new();
+    (directory.dev(), directory.ino(), link.file_name()).hash(&mut hasher);
+    let address = SocketAddr::from_abstract_name(format!("motion-io pty {:016x}", hasher.finish()))?;
+    match Claim::bind_addr(&address) {
+        Ok(claim) => Ok(Some(claim)),
+        Err(error) if error.kind() == io::ErrorKind::AddrInUse => {
+            Err(io::Error::other("in use by another program"))
+        }
+        // A system that has no such sockets.
+        Err(_) => Ok(None),
+    }
+}
+
+#[cfg(not(target_os = "linux"))]
+type Claim = ();
+
+#[cfg(not(target_os = "linux"))]
+fn claim(link: &Path) -> io::Result<Option<Claim>> {
+    directory(link).map(|_| None)
+}
+
+/// Where the link is to be.
+fn directory(link: &Path) -> io::Result<std::fs::Metadata> {
+    let directory = link.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let directory = std::fs::metadata(directory);
+    let missing = |error: &io::Error| error.kind() == io::ErrorKind::NotFound;
+    directory.map_err(|error| match missing(&error) {
+        true => io::Error::other("the directory of the link does not exist"),
+        false => error,
+    })
 }
 
 impl Drop for Pty {

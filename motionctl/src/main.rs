@@ -67,6 +67,11 @@ fn main() -> ExitCode {
             output::put(script);
             Ok(())
         }
+        Command::Man { output: Some(folder) }
+            if out.only_plans(|| format!("would write manual pages into {}", folder.display())) =>
+        {
+            Ok(())
+        }
         Command::Man { output: Some(folder) } => clap_mangen::generate_to(Cli::command(), &folder)
             .map_err(|error| exit::Exit::file(&folder.display().to_string(), &error)),
         Command::Man { output: None } => {

@@ -19,6 +19,7 @@ pub(crate) const SCHEMA_VERSION: u32 = 1;
 pub(crate) struct Output {
     pub(crate) json: bool,
     quiet: bool,
+    dry_run: bool,
     color: Color,
     /// Remarks go into the next document, or to standard error.
     remarks: RefCell<Vec<String>>,
@@ -26,7 +27,8 @@ pub(crate) struct Output {
 
 impl Output {
     pub(crate) fn new(global: &Global) -> Self {
-        Self { json: global.json, quiet: global.quiet, color: global.color, remarks: RefCell::default() }
+        let &Global { json, quiet, dry_run, color, .. } = global;
+        Self { json, quiet, dry_run, color, remarks: RefCell::default() }
     }
 
     /// Whether there are to be colours, on what is a terminal or is not.
@@ -69,6 +71,14 @@ impl Output {
     /// What a dry run would have done: its result.
     pub(crate) fn plan(&self, text: &str) {
         self.document(json!({ "dry_run": true, "plan": text }), || println!("{text}"));
+    }
+
+    /// In a dry run, tells what would have been done, which is then all that is done.
+    pub(crate) fn only_plans(&self, plan: impl FnOnce() -> String) -> bool {
+        if self.dry_run {
+            self.plan(&plan());
+        }
+        self.dry_run
     }
 
     /// Something worth knowing that is no result.
@@ -240,6 +250,18 @@ pub(crate) fn writable(path: &Path) -> Result<(), Exit> {
         _ => beside(path).map(drop),
     };
     tried.map_err(|error| Exit::file(&path.display().to_string(), &error))
+}
+
+/// Refuses two files of one command that are one: what is written would destroy what is read, or the other one.
+pub(crate) fn apart(one: (&str, &Path), other: (&str, &Path)) -> Result<(), Exit> {
+    let real = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.into());
+    // Devices and pipes, such as /dev/null, take any number of writers.
+    let special = std::fs::metadata(one.1).is_ok_and(|found| !found.is_file());
+    if special || real(one.1) != real(other.1) {
+        return Ok(());
+    }
+    let (name, (what, with)) = (one.1.display(), (one.0, other.0));
+    Err(Exit::usage(format!("{name}: {what} and {with} are the same file")))
 }
 
 /// `1 curve`, `2 curves`.

@@ -43,6 +43,9 @@ pub(crate) fn start(out: &Output, global: &Global, command: &Sim) -> Result<(), 
         .ok_or_else(|| Exit::usage(format!("--model {model}: 8230, 8231, 8235 or 8236 expected")))?;
     let endpoint: Endpoint =
         line.parse().map_err(|error: motion_io::endpoint::EndpointError| Exit::usage(error.to_string()))?;
+    if out.only_plans(|| format!("would be GEL {} on {endpoint}", model.number())) {
+        return Ok(());
+    }
     let stop = stop_flag()?;
     match state {
         Some(path) => {

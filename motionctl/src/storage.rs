@@ -14,10 +14,16 @@ impl FileStorage {
     pub(crate) fn open(path: &Path) -> std::io::Result<Self> {
         let file = File::options().read(true).write(true).create(true).truncate(false).open(path)?;
         file.try_lock().map_err(|_| std::io::Error::other("in use by another program"))?;
-        let len = file.metadata()?.len();
-        let missing = (STORAGE_LEN as u64).saturating_sub(len) as usize;
-        (&file).seek(SeekFrom::End(0))?;
-        (&file).write_all(&vec![0xFF; missing])?;
+        match file.metadata()?.len() {
+            // New.
+            0 => (&file).write_all(&vec![0xFF; STORAGE_LEN])?,
+            len if len == STORAGE_LEN as u64 => {}
+            // Somebody's file, which must not become another one's memory.
+            len => {
+                let text = format!("no state of a controller: {STORAGE_LEN} bytes expected, it has {len}");
+                return Err(std::io::Error::other(text));
+            }
+        }
         file.sync_all()?;
         Ok(Self(file))
     }

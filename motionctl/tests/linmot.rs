@@ -369,7 +369,7 @@ fn wrong_usage_is_named() {
     run(&["sim", "linmot"]).ends(2).says("--can EP or --serial EP expected");
     run(&["sim", "linmot", "--can", "slcan-pty:none/X"])
         .ends(5)
-        .says("error: slcan-pty:none/X: no such port");
+        .says("error: slcan-pty:none/X: the directory of the link does not exist");
     let build = ["linmot", "curve", "build", "--to", "1mm", "--length", "1s", "-o", "none/C.csv"];
     let ran = run(&build).ends(5);
     assert_eq!(ran.stderr(), "error: none/C.csv: No such file or directory (os error 2)\n");

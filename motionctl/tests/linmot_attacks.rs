@@ -94,6 +94,27 @@ fn a_restore_whose_drive_goes_says_how_far_it_came() {
     }
 }
 
+/// Ctrl-C ended a restore without a word.
+#[test]
+fn a_restore_that_is_stopped_by_a_signal_says_how_far_it_came() {
+    for (endpoint, carrier) in CARRIERS {
+        let bench = Bench::new();
+        let _drive = large(&bench, endpoint);
+        let linmot = Linmot { bench: &bench, carrier };
+        other_values(&bench, &linmot);
+        let restore = begun(&bench, carrier);
+        let id = rustix::process::Pid::from_child(&restore);
+        rustix::process::kill_process(id, rustix::process::Signal::INT).unwrap();
+        Ran(restore.wait_with_output().unwrap())
+            .ends(5)
+            .says("incomplete: ")
+            .says("stopped by a signal")
+            .says("the same restore completes it");
+        linmot.run(&["--yes", "pvl", "restore", "R.pvl"]).ends(0);
+        linmot.run(&["pvl", "compare", "R.pvl"]).ends(0);
+    }
+}
+
 /// Answers on a pseudo-terminal: called with what has come, nothing every few milliseconds.
 struct Peer {
     stop: Arc<AtomicBool>,

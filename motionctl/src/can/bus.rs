@@ -20,8 +20,11 @@ pub(crate) fn run(out: &Output, arguments: &Bus) -> Result<(), Exit> {
         }
     }
     let buses = names.iter().map(|name| (name.clone(), VirtualBus::new(arguments.bitrate, Faults::NONE)));
-    let stop = stop_flag()?;
     let listen = &arguments.listen;
+    if out.only_plans(|| format!("would serve {} at {listen}", names.join(", "))) {
+        return Ok(());
+    }
+    let stop = stop_flag()?;
     let server = Server::bind(listen, buses.collect()).map_err(|error| match error.kind() {
         std::io::ErrorKind::InvalidInput => Exit::usage(format!("--listen {listen}: HOST:PORT expected")),
         _ => Exit::trouble(format!("{listen}: {error}")),

@@ -42,9 +42,22 @@ static STOP: OnceLock<Arc<AtomicBool>> = OnceLock::new();
 
 /// Set by a signal that asks the program to stop, and by [`stop`].
 pub(crate) fn stop_flag() -> Result<Arc<AtomicBool>, Exit> {
-    let flag = Arc::clone(STOP.get_or_init(Arc::default));
-    ctrlc::set_handler(stop).map_err(|error| Exit::trouble(error.to_string()))?;
-    Ok(flag)
+    if STOP.set(Arc::default()).is_ok() {
+        let handler = || {
+            SIGNAL.store(true, Ordering::Relaxed);
+            stop();
+        };
+        ctrlc::set_handler(handler).map_err(|error| Exit::trouble(error.to_string()))?;
+    }
+    Ok(STOP.get().map(Arc::clone).unwrap_or_default())
+}
+
+/// A signal has come that nobody has looked at.
+static SIGNAL: AtomicBool = AtomicBool::new(false);
+
+/// Whether a signal has asked the program to stop since this was asked last; [`stop_flag`] catches them.
+pub(crate) fn interrupted() -> bool {
+    SIGNAL.swap(false, Ordering::Relaxed)
 }
 
 /// Asks a command that runs until it is stopped to stop.

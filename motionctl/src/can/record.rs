@@ -87,6 +87,9 @@ pub(super) fn run(
     let limit = run.limit;
     let endpoint = endpoint(global, line)?;
     let name = path.display().to_string();
+    if out.only_plans(|| format!("would record {endpoint} to {name}")) {
+        return Ok(());
+    }
     let trouble = |error: io::Error| Exit::file(&name, &error);
     let mut port = open(&endpoint).map_err(|error| Exit::trouble(error.to_string()))?;
     let mut writer = Writer::new(BufWriter::new(File::create(path).map_err(trouble)?), format);

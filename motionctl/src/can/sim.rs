@@ -56,11 +56,14 @@ fn run<D: Device>(
     kind: &str,
     mut node: Node<D>,
 ) -> Result<(), Exit> {
+    let endpoint = endpoint(global, &arguments.line)?;
+    if out.only_plans(|| format!("would be {kind}, node {}, on {endpoint}", arguments.node)) {
+        return Ok(());
+    }
     if let Some(path) = &arguments.write_eds {
         let name = path.file_stem().map_or(kind.into(), |stem| stem.to_string_lossy().into_owned());
         write_beside(path, write_eds(&device_file(&node, &name)).as_bytes())?;
     }
-    let endpoint = endpoint(global, &arguments.line)?;
     let stop = stop_flag()?;
     let port = open(&endpoint).map_err(|error| Exit::trouble(error.to_string()))?;
     let mut driver = Driver::new(port);

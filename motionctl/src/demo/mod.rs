@@ -15,7 +15,7 @@ use pdo::NodeId;
 use serde_json::{Value, json};
 
 use crate::exit::Exit;
-use crate::output::Output;
+use crate::output::{Output, apart};
 use crate::plot;
 use machine::Machine;
 
@@ -37,6 +37,17 @@ pub(crate) struct Demo {
 }
 
 pub(crate) fn run(out: &Output, arguments: &Demo) -> Result<(), Exit> {
+    let files = [&arguments.record, &arguments.plot].map(Option::as_deref);
+    if let [Some(record), Some(plot)] = files {
+        apart(("--record", record), ("--plot", plot))?;
+    }
+    let plan = || {
+        let files = files.iter().flatten().map(|file| format!(", write {}", file.display()));
+        format!("would run the example on virtual devices{}", files.collect::<String>())
+    };
+    if out.only_plans(plan) {
+        return Ok(());
+    }
     out.say("Application example of manual A 6.11: one axis, LD 2000 on CAN 2.\n");
     let setup::Configured { storage, model, mut document } = setup::configure(out)?;
 

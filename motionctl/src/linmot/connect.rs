@@ -1,5 +1,7 @@
 //! From the command line to a link, and from a link's errors to exit codes.
 
+use std::io;
+
 use linmot::code::Status;
 use linmot::link::{Fault, Link};
 use linmot::linrs::{Checksum, Config};
@@ -10,6 +12,7 @@ use motion_io::port::{Role, open};
 use pdo::NodeId;
 
 use super::cli::{Carrier, Drive, SumKind};
+use crate::can::{interrupted, stop_flag};
 use crate::cli::Global;
 use crate::connect::{ChoiceOf, choose};
 use crate::exit::Exit;
@@ -17,13 +20,17 @@ use crate::exit::Exit;
 /// Reads are repeated so often.
 const RETRIES: u8 = 2;
 
-/// Any carrier.
+/// Any carrier. A signal that asks the program to stop ends the command that comes next, once: what was to be
+/// done is told as after any other trouble, and what puts the drive in order again still passes.
 pub(crate) struct AnyLink(Box<dyn Link<Error = LinkError>>);
 
 impl Link for AnyLink {
     type Error = LinkError;
 
     fn call(&mut self, request: &Request) -> Result<Reply, LinkError> {
+        if interrupted() {
+            return Err(LinkError::Port(io::Error::other("stopped by a signal")));
+        }
         self.0.call(request)
     }
 }
@@ -37,6 +44,7 @@ pub(super) fn checksum(sum: SumKind) -> Checksum {
 }
 
 pub(super) fn connect(global: &Global, drive: &Drive) -> Result<AnyLink, Exit> {
+    stop_flag()?;
     let (carrier, endpoint) = endpoint(global, drive)?;
     let wrong = |error: motion_io::endpoint::EndpointError| Exit::usage(error.to_string());
     if carrier == ChoiceOf::Port {

@@ -2,7 +2,8 @@
 
 use core::sync::atomic::Ordering;
 use core::time::Duration;
-use std::io::{self, Write};
+use std::fs::File;
+use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
 use device_sim::linmot::{CanDrive, Times, VirtualDrive, generated};
@@ -28,6 +29,10 @@ const TURN: Duration = Duration::from_millis(50);
 pub(crate) fn run(out: &Output, global: &Global, arguments: &SimLinmot) -> Result<(), Exit> {
     if arguments.can.is_none() && arguments.serial.is_none() {
         return Err(Exit::usage("where the drive shall be: --can EP or --serial EP expected"));
+    }
+    let places = || [&arguments.can, &arguments.serial].into_iter().flatten().cloned().collect::<Vec<_>>();
+    if out.only_plans(|| format!("would be a LinMot drive {} on {}", arguments.node, places().join(", "))) {
+        return Ok(());
     }
     let mut drive = VirtualDrive::new(generated(arguments.parameters), Times::default());
     // What a drive without motor data has logged by the time it is first used.
@@ -69,24 +74,30 @@ pub(crate) fn run(out: &Output, global: &Global, arguments: &SimLinmot) -> Resul
         .map_err(|error| Exit::file(serial, &error))
 }
 
-/// Non-volatile memory in a file.
+/// Non-volatile memory in a file, which no other program may use meanwhile.
 struct State {
     path: PathBuf,
+    /// Holds the lock. The file itself is replaced with each write, so the lock moves on to the new one.
+    file: Option<File>,
     /// Writes of the drive that the file holds.
     kept: u64,
 }
 
 impl State {
     fn new(path: &Path) -> Self {
-        Self { path: path.into(), kept: 0 }
+        Self { path: path.into(), file: None, kept: 0 }
     }
 
     fn load(&mut self, drive: &mut VirtualDrive) -> io::Result<()> {
-        match std::fs::read(&self.path) {
-            Ok(image) => drive.load_image(&image).map_err(io::Error::other),
-            Err(error) if error.kind() == io::ErrorKind::NotFound => self.write(drive),
-            Err(error) => Err(error),
-        }
+        let mut file = match File::open(&self.path) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return self.write(drive),
+            opened => opened?,
+        };
+        lock(&file)?;
+        let mut image = Vec::new();
+        file.read_to_end(&mut image)?;
+        self.file = Some(file);
+        drive.load_image(&image).map_err(io::Error::other)
     }
 
     fn keep(&mut self, drive: &VirtualDrive) -> io::Result<()> {
@@ -98,11 +109,16 @@ impl State {
     }
 
     /// The old file stays until the new one is complete.
-    fn write(&self, drive: &VirtualDrive) -> io::Result<()> {
+    fn write(&mut self, drive: &VirtualDrive) -> io::Result<()> {
         let directory = self.path.parent().filter(|parent| !parent.as_os_str().is_empty());
         let mut file = tempfile::NamedTempFile::new_in(directory.unwrap_or(Path::new(".")))?;
         file.write_all(&drive.image())?;
-        file.persist(&self.path)?;
+        lock(file.as_file())?;
+        self.file = Some(file.persist(&self.path)?);
         Ok(())
     }
+}
+
+fn lock(file: &File) -> io::Result<()> {
+    file.try_lock().map_err(|_| io::Error::other("in use by another program"))
 }

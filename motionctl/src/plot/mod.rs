@@ -12,7 +12,7 @@ pub(crate) use chart::{Curve, Panel, drawing};
 pub(crate) use recording::{Recorder, Sample, write};
 
 use crate::exit::Exit;
-use crate::output::{Output, write_beside};
+use crate::output::{Output, apart, write_beside};
 
 #[derive(Debug, Args)]
 pub(crate) struct Plot {
@@ -37,6 +37,12 @@ pub(crate) struct Plot {
 
 pub(crate) fn run(out: &Output, arguments: &Plot) -> Result<(), Exit> {
     let name = arguments.file.display().to_string();
+    let output = match (&arguments.output, name.as_str()) {
+        (Some(output), _) => output.clone(),
+        (None, "-") => return Err(Exit::usage("--output F.svg expected, as FILE is standard input")),
+        (None, _) => arguments.file.with_extension("svg"),
+    };
+    apart(("FILE", &arguments.file), ("the drawing (--output)", &output))?;
     let mut samples = if name == "-" {
         recording::read("standard input", std::io::stdin().lock())?
     } else {
@@ -51,11 +57,9 @@ pub(crate) fn run(out: &Output, arguments: &Plot) -> Result<(), Exit> {
     if samples.is_empty() {
         return Err(Exit::check(format!("{name}: nothing of these axes at these times")));
     }
-    let output = match (&arguments.output, name.as_str()) {
-        (Some(output), _) => output.clone(),
-        (None, "-") => return Err(Exit::usage("--output F.svg expected, as FILE is standard input")),
-        (None, _) => arguments.file.with_extension("svg"),
-    };
+    if out.only_plans(|| format!("would draw {} samples in {}", samples.len(), output.display())) {
+        return Ok(());
+    }
     draw(&output, &name, &samples)?;
     let document = json!({ "output": output.display().to_string(), "samples": samples.len() });
     out.document(document, || out.say(&format!("{} samples drawn in {}", samples.len(), output.display())));

@@ -81,6 +81,9 @@ impl Sample {
     }
 }
 
+/// No axis comes near; a drawing cannot span much more.
+const GREATEST: f64 = 1e100;
+
 /// Reads a recording; an error says the line and what was expected there.
 pub(crate) fn read(name: &str, source: impl Read) -> Result<Vec<Sample>, Exit> {
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(source);
@@ -108,8 +111,11 @@ pub(crate) fn read(name: &str, source: impl Read) -> Result<Vec<Sample>, Exit> {
             }
             _ => trouble(error.to_string()),
         })?;
-        if sample.numbers().iter().flatten().any(|number| !number.is_finite()) {
-            return Err(trouble("a number that is not finite".into()));
+        if let Some(number) = sample.numbers().iter().flatten().find(|number| !number.is_finite()) {
+            return Err(trouble(format!("{number}: a number that is finite expected")));
+        }
+        if let Some(number) = sample.numbers().iter().flatten().find(|number| number.abs() > GREATEST) {
+            return Err(trouble(format!("{number:e}: at most {GREATEST:e} expected")));
         }
         let before = samples.iter().rev().take(6).find(|before| before.axis == sample.axis);
         if let Some(before) = before.filter(|before| before.t > sample.t) {
@@ -148,7 +154,16 @@ pub(crate) struct Recorder {
 impl Recorder {
     pub(crate) fn create(path: &Path) -> Result<Self, Exit> {
         let name = path.display().to_string();
-        let file = std::fs::File::create(path).map_err(|error| Exit::file(&name, &error))?;
+        let trouble = |error: std::io::Error| Exit::file(&name, &error);
+        let file = std::fs::File::options().write(true).create(true).truncate(false).open(path);
+        let file = file.map_err(trouble)?;
+        // Two writers would mix their lines.
+        if let Err(std::fs::TryLockError::WouldBlock) = file.try_lock() {
+            return Err(Exit::file(&name, &"in use by another program"));
+        }
+        if file.metadata().is_ok_and(|found| found.is_file()) {
+            file.set_len(0).map_err(trouble)?;
+        }
         let (samples, received) = channel();
         let thread = std::thread::spawn(move || write(&name, file, received));
         Ok(Self { samples, thread })
@@ -197,7 +212,8 @@ mod tests {
         assert!(refused("t,position\n").contains("no line after it"));
         let wrong = refused("t,position\n0,1\n1,fast\n");
         assert!(wrong.contains("line 3: position: invalid float literal"), "{wrong}");
-        assert!(refused("t,position\n0,NaN\n").contains("line 2: a number that is not finite"));
+        assert!(refused("t,position\n0,NaN\n").contains("line 2: NaN: a number that is finite"));
+        assert!(refused("t,position\n0,8e307\n").contains("line 2: 8e307: at most 1e100"));
         assert!(refused("t,position\n1,1\n0,1\n").contains("line 3: t = 0 after t = 1"));
         assert!(refused("t,position\n1\n").contains("line: 2"), "{}", refused("t,position\n1\n"));
         assert!(read("F.csv", [b'\xFF'; 10].as_slice()).is_err());

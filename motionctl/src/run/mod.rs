@@ -28,7 +28,7 @@ use motion_io::port::{Role, open};
 
 use crate::can::stop_flag;
 use crate::exit::Exit;
-use crate::output::Output;
+use crate::output::{Output, apart, counted};
 use crate::plot::{Recorder, Sample};
 use crate::storage::FileStorage;
 use buses::{Bus, Devices};
@@ -51,6 +51,16 @@ pub(crate) fn run(out: &Output, arguments: &cli::Run) -> Result<(), Exit> {
         ),
         None => None,
     };
+    if let Some(record) = &arguments.record {
+        apart(("the configuration", &arguments.file), ("--record", record))?;
+    }
+    let of_file = |exit: Exit| match exit.status {
+        2 => exit.context(&arguments.file.display().to_string()),
+        _ => exit,
+    };
+    if only_plans(out, &config, arguments.record.as_deref()).map_err(of_file)? {
+        return Ok(());
+    }
     let flash = match &config.controller.state {
         Some(directory) => {
             std::fs::create_dir_all(directory)
@@ -60,9 +70,7 @@ pub(crate) fn run(out: &Output, arguments: &cli::Run) -> Result<(), Exit> {
         None => None,
     };
     let recorder = arguments.record.as_deref().map(Recorder::create).transpose()?;
-    let ended = begin(out, &config, flash.as_deref(), limit, recorder.as_ref()).map_err(|exit| {
-        if exit.status == 2 { exit.context(&arguments.file.display().to_string()) } else { exit }
-    });
+    let ended = begin(out, &config, flash.as_deref(), limit, recorder.as_ref()).map_err(of_file);
     // What was recorded is kept whatever ended the run.
     let recorded = recorder.map_or(Ok(()), Recorder::finish);
     ended.and(recorded)
@@ -82,7 +90,40 @@ pub(crate) struct Device<'a> {
 
 pub(crate) fn device(out: &Output, device: &Device<'_>) -> Result<(), Exit> {
     let Device { model, number, serial, can, parameters, state } = *device;
-    begin(out, &Config::of_controller(model, number, serial, can, parameters)?, state, None, None)
+    let config = Config::of_controller(model, number, serial, can, parameters)?;
+    if only_plans(out, &config, None)? {
+        return Ok(());
+    }
+    begin(out, &config, state, None, None)
+}
+
+/// Whether this is a dry run, which is then told. Mistakes of the configuration are found in any case, before
+/// a file, a port or a bus is touched.
+fn only_plans(out: &Output, config: &Config, record: Option<&Path>) -> Result<bool, Exit> {
+    prepare(config, vec![0xFF; STORAGE_LEN])?;
+    let mut places = Vec::new();
+    for serial in &config.serial {
+        places.push(format!(", LB2 on {}", serial.endpoint()?));
+    }
+    for (name, text) in [(BusName::Can1, "CAN 1"), (BusName::Can2, "CAN 2")] {
+        if let Some(can) = config.can(name) {
+            places.push(format!(", {text} on {}", can.endpoint()?));
+        }
+    }
+    places.extend(config.controller.state.iter().map(|state| format!(", its flash in {}", state.display())));
+    places.extend(record.iter().map(|record| format!(", recorded in {}", record.display())));
+    let steps = counted(config.program.len(), "step", "steps");
+    let model = config.model()?.number();
+    let plan = || format!("would run a GEL {model} with {steps}{}", places.concat());
+    Ok(out.only_plans(plan))
+}
+
+/// A controller with the configuration's parameters, and its program.
+fn prepare<S: Storage>(config: &Config, storage: S) -> Result<(Controller<S, Vec<u8>>, Program), Exit> {
+    let mut controller = Controller::power_on(config.model()?, storage, vec![0; BANK_LEN]);
+    set_up(&mut controller, config)?;
+    data::set_up(&mut controller, &config.program)?;
+    Ok((controller, Program::new(&config.program)?))
 }
 
 /// With its flash in a file, or in memory.
@@ -136,11 +177,8 @@ fn control(
     recorder: Option<&Recorder>,
 ) -> Result<(), Exit> {
     let model = config.model()?;
-    let mut controller = Controller::power_on(model, storage, vec![0; BANK_LEN]);
-    set_up(&mut controller, config)?;
-    data::set_up(&mut controller, &config.program)?;
+    let (mut controller, mut program) = prepare(config, storage)?;
     let mut machine = plants::machine(&config.simulate)?;
-    let mut program = Program::new(&config.program)?;
     let mut extension = config.extension.as_ref().map(config::Extension::open).transpose()?;
     if let Some(server) = &mut extension {
         // The sizes of the images are known before anybody knows the address.

@@ -18,6 +18,15 @@ impl Bench {
         self.directory.path().join(name)
     }
 
+    /// The files in the directory, by name.
+    #[allow(dead_code)] // not in every test program
+    pub(crate) fn names(&self) -> Vec<std::ffi::OsString> {
+        let entries = std::fs::read_dir(self.directory.path()).unwrap();
+        let mut names: Vec<_> = entries.map(|entry| entry.unwrap().file_name()).collect();
+        names.sort();
+        names
+    }
+
     pub(crate) fn run(&self, arguments: &[&str]) -> Ran {
         Ran(self.command(arguments).output().unwrap())
     }
