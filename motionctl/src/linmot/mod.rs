@@ -8,6 +8,7 @@ mod params;
 mod pvl;
 pub(crate) mod sim;
 mod table;
+mod table_file;
 
 use core::time::Duration;
 use std::time::Instant;

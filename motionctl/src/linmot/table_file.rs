@@ -1,0 +1,88 @@
+//! Command tables as TOML: of each entry its bytes, beside what they say for people (project-defined).
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use linmot::table::{ENTRIES, Entry, EntryError};
+
+use super::text;
+use crate::exit::Exit;
+use crate::output::write_beside;
+
+/// Entries by number.
+pub(super) type Entries = BTreeMap<u16, Entry>;
+
+/// Version of the files.
+const FORMAT: i64 = 1;
+
+pub(super) fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02X}")).collect()
+}
+
+pub(super) fn parse(raw: &str) -> Result<Entry, String> {
+    let digits: String = raw.chars().filter(|c| !c.is_whitespace()).collect();
+    if let Some(other) = digits.chars().find(|c| !c.is_ascii_hexdigit()) {
+        return Err(format!("hex digits expected, {other:?} found"));
+    }
+    let bytes: Option<Vec<u8>> =
+        (0..digits.len()).step_by(2).map(|at| u8::from_str_radix(digits.get(at..at + 2)?, 16).ok()).collect();
+    let bytes = bytes.ok_or_else(|| format!("hex digits in pairs expected, {} found", digits.len()))?;
+    Entry::parse(&bytes).map_err(|error| match error {
+        EntryError::Version(_) => {
+            format!("{} at the beginning, 01A7 (version A701h) expected", hex(&bytes[..2]))
+        }
+        other => other.to_string(),
+    })
+}
+
+pub(super) fn save(path: &Path, entries: &Entries) -> Result<(), Exit> {
+    let mut document = toml_edit::DocumentMut::new();
+    document.insert("format", toml_edit::value(FORMAT));
+    let mut list = toml_edit::ArrayOfTables::new();
+    for (number, entry) in entries {
+        let mut table = toml_edit::Table::new();
+        table.insert("entry", toml_edit::value(i64::from(*number)));
+        table.insert("name", toml_edit::value(text(entry.name())));
+        if let Some(linked) = entry.linked() {
+            table.insert("linked", toml_edit::value(i64::from(linked)));
+        }
+        table.insert("header", toml_edit::value(i64::from(entry.header())));
+        table.insert("raw", toml_edit::value(hex(entry.bytes())));
+        list.push(table);
+    }
+    document.insert("entry", toml_edit::Item::ArrayOfTables(list));
+    write_beside(path, document.to_string().as_bytes())
+}
+
+/// Of each entry `raw` counts; name, link and header are there for people.
+pub(super) fn load(path: &Path) -> Result<Entries, Exit> {
+    let name = path.display().to_string();
+    let content = std::fs::read_to_string(path).map_err(|error| Exit::file(&name, &error))?;
+    let document: toml_edit::DocumentMut = content.parse().map_err(|error| Exit::file(&name, &error))?;
+    if document.get("format").and_then(toml_edit::Item::as_integer) != Some(FORMAT) {
+        let found =
+            document.get("format").map_or("nothing".into(), |item| item.to_string().trim().to_owned());
+        return Err(Exit::file(
+            &name,
+            &format!("no command table file: format = {FORMAT} expected, {found} found"),
+        ));
+    }
+    let mut entries = Entries::new();
+    let list = document.get("entry").and_then(toml_edit::Item::as_array_of_tables);
+    for (position, table) in (1..).zip(list.into_iter().flatten()) {
+        let wrong = |what: &str| Exit::file(&name, &format!("entry no. {position} of the file: {what}"));
+        let number = table
+            .get("entry")
+            .and_then(toml_edit::Item::as_integer)
+            .and_then(|number| u16::try_from(number).ok())
+            .filter(|number| ENTRIES.contains(number))
+            .ok_or_else(|| wrong("entry = 1 to 255 expected"))?;
+        let raw =
+            table.get("raw").and_then(|item| item.as_str()).ok_or_else(|| wrong("raw = \"…\" expected"))?;
+        let entry = parse(raw).map_err(|error| wrong(&error))?;
+        if entries.insert(number, entry).is_some() {
+            return Err(wrong(&format!("entry {number} occurs twice")));
+        }
+    }
+    Ok(entries)
+}
