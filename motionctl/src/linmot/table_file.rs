@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use linmot::table::{ENTRIES, Entry, EntryError};
+use toml_edit::{ArrayOfTables, Item, Table};
 
 use super::text;
 use crate::exit::Exit;
@@ -38,9 +39,9 @@ pub(super) fn parse(raw: &str) -> Result<Entry, String> {
 pub(super) fn save(path: &Path, entries: &Entries) -> Result<(), Exit> {
     let mut document = toml_edit::DocumentMut::new();
     document.insert("format", toml_edit::value(FORMAT));
-    let mut list = toml_edit::ArrayOfTables::new();
+    let mut list = ArrayOfTables::new();
     for (number, entry) in entries {
-        let mut table = toml_edit::Table::new();
+        let mut table = Table::new();
         table.insert("entry", toml_edit::value(i64::from(*number)));
         table.insert("name", toml_edit::value(text(entry.name())));
         if let Some(linked) = entry.linked() {
@@ -50,39 +51,74 @@ pub(super) fn save(path: &Path, entries: &Entries) -> Result<(), Exit> {
         table.insert("raw", toml_edit::value(hex(entry.bytes())));
         list.push(table);
     }
-    document.insert("entry", toml_edit::Item::ArrayOfTables(list));
+    document.insert("entry", Item::ArrayOfTables(list));
     write_beside(path, document.to_string().as_bytes())
 }
 
-/// Of each entry `raw` counts; name, link and header are there for people.
+/// Of each entry `raw` counts; name, link and header are there for people, and must not say anything else.
 pub(super) fn load(path: &Path) -> Result<Entries, Exit> {
     let name = path.display().to_string();
     let content = std::fs::read_to_string(path).map_err(|error| Exit::file(&name, &error))?;
     let document: toml_edit::DocumentMut = content.parse().map_err(|error| Exit::file(&name, &error))?;
-    if document.get("format").and_then(toml_edit::Item::as_integer) != Some(FORMAT) {
+    let wrong = |what: &str| Exit::file(&name, &what);
+    if document.get("format").and_then(Item::as_integer) != Some(FORMAT) {
         let found =
             document.get("format").map_or("nothing".into(), |item| item.to_string().trim().to_owned());
-        return Err(Exit::file(
-            &name,
-            &format!("no command table file: format = {FORMAT} expected, {found} found"),
-        ));
+        return Err(wrong(&format!("no command table file: format = {FORMAT} expected, {found} found")));
     }
+    known(&document, &["format", "entry"]).map_err(|error| wrong(&error))?;
+    let list = match document.get("entry") {
+        Some(item) => item.as_array_of_tables().ok_or_else(|| wrong("entry: [[entry]] expected"))?,
+        None => &ArrayOfTables::new(),
+    };
     let mut entries = Entries::new();
-    let list = document.get("entry").and_then(toml_edit::Item::as_array_of_tables);
-    for (position, table) in (1..).zip(list.into_iter().flatten()) {
-        let wrong = |what: &str| Exit::file(&name, &format!("entry no. {position} of the file: {what}"));
+    for (position, table) in (1..).zip(list) {
         let number = table
             .get("entry")
-            .and_then(toml_edit::Item::as_integer)
+            .and_then(Item::as_integer)
             .and_then(|number| u16::try_from(number).ok())
             .filter(|number| ENTRIES.contains(number))
-            .ok_or_else(|| wrong("entry = 1 to 255 expected"))?;
-        let raw =
-            table.get("raw").and_then(|item| item.as_str()).ok_or_else(|| wrong("raw = \"…\" expected"))?;
-        let entry = parse(raw).map_err(|error| wrong(&error))?;
+            .ok_or_else(|| wrong(&format!("entry no. {position} of the file: entry = 1 to 255 expected")))?;
+        let entry = entry(table).map_err(|error| wrong(&format!("entry {number}: {error}")))?;
         if entries.insert(number, entry).is_some() {
             return Err(wrong(&format!("entry {number} occurs twice")));
         }
     }
     Ok(entries)
+}
+
+fn entry(table: &Table) -> Result<Entry, String> {
+    known(table, &["entry", "name", "linked", "header", "raw"])?;
+    let entry = parse(table.get("raw").and_then(Item::as_str).ok_or("raw = \"…\" expected")?)?;
+    let name = text(entry.name());
+    let linked = entry.linked().map(i64::from);
+    let header = i64::from(entry.header());
+    let says = |key| table.get(key).and_then(Item::as_integer);
+    for (key, agrees, has) in [
+        ("name", table.get("name").and_then(Item::as_str) == Some(&name), format!("{name:?}")),
+        (
+            "linked",
+            linked.is_some() && says("linked") == linked,
+            linked.map_or("none".into(), |to| to.to_string()),
+        ),
+        ("header", says("header") == Some(header), header.to_string()),
+    ] {
+        if let Some(item) = table.get(key)
+            && !agrees
+        {
+            return Err(format!(
+                "{key} = {} contradicts raw, which has {has}: raw is what counts, name, linked and header are \
+                 there for people; change raw, or leave {key} out",
+                item.to_string().trim()
+            ));
+        }
+    }
+    Ok(entry)
+}
+
+fn known(table: &Table, keys: &[&str]) -> Result<(), String> {
+    match table.iter().find(|(key, _)| !keys.contains(key)) {
+        Some((key, _)) => Err(format!("unknown key {key:?}, {} expected", keys.join(", "))),
+        None => Ok(()),
+    }
 }

@@ -1,0 +1,52 @@
+//! Command tables in TOML files: what a file says twice, what a restore deletes, links and loops.
+#![cfg(unix)]
+
+mod common;
+#[path = "common/linmot.rs"]
+mod linmot;
+
+use common::Bench;
+use linmot::{Linmot, drive, entry};
+
+const CAN: &[&str] = &["--can", "slcan:LINE"];
+
+/// What a file says of an entry beside its bytes is not ignored when it has been edited.
+#[test]
+fn a_name_link_or_header_that_contradicts_raw_is_refused() {
+    let bench = Bench::new();
+    let _drive = drive(&bench, "--can=slcan-pty:LINE");
+    let linmot = Linmot { bench: &bench, carrier: CAN };
+    linmot.run(&["table", "set", "3", "--raw", &entry(7, "Move \"out\"")]).ends(0);
+    linmot.run(&["table", "set", "7", "--raw", &entry(0xFFFF, "")]).ends(0);
+    linmot.run(&["table", "backup", "T.toml"]).ends(0);
+    let text = std::fs::read_to_string(bench.path("T.toml")).unwrap();
+    for (from, to, words) in [
+        (
+            "'Move \"out\"'",
+            "\"Move in\"",
+            "entry 3: name = \"Move in\" contradicts raw, which has \"Move \\\"out\\\"\"",
+        ),
+        ("linked = 7", "linked = 8", "entry 3: linked = 8 contradicts raw, which has 7: raw is what counts"),
+        ("header = 256", "header = 512", "header = 512 contradicts raw, which has 256: "),
+        ("header = 256", "header = \"256\"", "change raw, or leave header out"),
+        ("name = \"\"", "linked = 65535", "entry 7: linked = 65535 contradicts raw, which has none"),
+        (
+            "linked = 7",
+            "link = 7",
+            "entry 3: unknown key \"link\", entry, name, linked, header, raw expected",
+        ),
+        ("format = 1", "format = 1\nname = \"x\"", "T2.toml: unknown key \"name\""),
+        (&text, "format = 1\nentry = 3\n", "entry: [[entry]] expected"),
+    ] {
+        assert!(text.contains(from), "{from}: {text}");
+        std::fs::write(bench.path("T2.toml"), text.replacen(from, to, 1)).unwrap();
+        for arguments in [&["table", "compare", "T2.toml"][..], &["--yes", "table", "restore", "T2.toml"]] {
+            linmot.run(arguments).ends(5).says("T2.toml: ").says(words);
+        }
+    }
+    // What is not said contradicts nothing.
+    let raw: String =
+        text.lines().filter(|line| !line.starts_with("header")).map(|line| format!("{line}\n")).collect();
+    std::fs::write(bench.path("T2.toml"), raw).unwrap();
+    linmot.run(&["table", "compare", "T2.toml"]).ends(0).says("2 equal");
+}
