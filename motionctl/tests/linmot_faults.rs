@@ -148,7 +148,7 @@ fn software_that_runs_again_is_named() {
             linmot
                 .run(&["--yes", "table", "restore", "T.toml"])
                 .ends(4)
-                .says("1 of 1 entry written and 1 others deleted in RAM, the same restore completes it")
+                .says("1 of 1 entry written and 1 other deleted in RAM, the same restore completes it")
                 .says(words);
             linmot.run(&["--yes", "table", "restore", "T.toml"]).ends(0);
         },

@@ -165,6 +165,10 @@ fn files_of_another_kind_are_named_as_such() {
     }
     for (content, words) in [
         ("format = 2\n", "format = 1 expected, 2 found"),
+        (
+            "format = 1\n",
+            "it has no entries, so that a restore deletes all: entries = 0 in its head must say so",
+        ),
         ("format = 1\n[[entry]]\nentry = 256\n", "entry no. 1 of the file: entry = 1 to 255 expected"),
         ("format = 1\n[[entry]]\nentry = 1\n", "entry 1: raw = \"…\" expected"),
         ("format = 1\n[[entry]]\nentry = 1\nraw = \"01A7\"\n", "2 bytes, 64 expected"),

@@ -50,3 +50,55 @@ fn a_name_link_or_header_that_contradicts_raw_is_refused() {
     std::fs::write(bench.path("T2.toml"), raw).unwrap();
     linmot.run(&["table", "compare", "T2.toml"]).ends(0).says("2 equal");
 }
+
+/// Which entries go is said before and after; a file that was cut off deletes nothing.
+#[test]
+fn a_table_restore_says_what_it_deletes() {
+    let bench = Bench::new();
+    let _drive = drive(&bench, "--can=slcan-pty:LINE");
+    let linmot = Linmot { bench: &bench, carrier: CAN };
+    let set = |number: &str| {
+        linmot.run(&["table", "set", number, "--raw", &entry(0xFFFF, "x")]).ends(0);
+    };
+    ["1", "2", "3"].into_iter().for_each(set);
+    linmot.run(&["table", "backup", "T.toml"]).ends(0);
+    let text = std::fs::read_to_string(bench.path("T.toml")).unwrap();
+    for (at, _) in text.match_indices('\n') {
+        std::fs::write(bench.path("C.toml"), &text[..=at]).unwrap();
+        if at + 1 < text.trim_end().len() {
+            linmot.run(&["--yes", "table", "restore", "C.toml"]).ends(5).says("C.toml: ");
+        }
+    }
+    let (cut, _) = text.split_at(text.rfind("[[entry]]").unwrap());
+    std::fs::write(bench.path("C.toml"), cut).unwrap();
+    linmot
+        .run(&["--yes", "table", "restore", "C.toml"])
+        .ends(5)
+        .says("C.toml: entries = 3 in its head, 2 are there: the file was cut off or changed");
+
+    ["7", "9"].into_iter().for_each(set);
+    let words = "entries 7, 9, which the file does not have, ";
+    let json = linmot.json(&["--dry-run", "table", "restore", "T.toml"]);
+    assert_eq!(json["plan"], format!("would write 3 entries to RAM and flash; {words}would be deleted"));
+    assert_eq!(json["deleted"], serde_json::json!([7, 9]));
+    linmot.run(&["table", "restore", "T.toml"]).ends(2).says(&format!("{words}will be deleted?"));
+    linmot.run(&["--yes", "table", "restore", "T.toml"]).ends(0).says(&format!("{words}deleted"));
+    set("7");
+    let json = linmot.json(&["--yes", "table", "restore", "T.toml"]);
+    assert_eq!(json["deleted"], serde_json::json!([7]));
+
+    // Files of before have no number of entries; one without any entry must say that.
+    std::fs::write(bench.path("O.toml"), text.replacen("entries = 3\n", "", 1)).unwrap();
+    linmot.run(&["table", "compare", "O.toml"]).ends(0);
+    std::fs::write(bench.path("O.toml"), "format = 1\n").unwrap();
+    linmot.run(&["--yes", "table", "restore", "O.toml"]).ends(5).says("it has no entries");
+    std::fs::write(bench.path("O.toml"), "entries = 0\nformat = 1\n").unwrap();
+    linmot
+        .run(&["table", "restore", "O.toml"])
+        .ends(2)
+        .says("0 entries, to RAM and flash; entries 1, 2, 3, all that the drive has, will be deleted?");
+    linmot.run(&["--yes", "table", "restore", "O.toml"]).ends(0);
+    linmot.run(&["table", "list"]).ends(0).says("no entries");
+    linmot.run(&["table", "backup", "T.toml"]).ends(0);
+    linmot.run(&["--yes", "table", "restore", "T.toml"]).ends(0).says("0 entries written");
+}

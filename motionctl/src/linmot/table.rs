@@ -186,16 +186,33 @@ fn restore(out: &Output, global: &Global, drive: &Drive, path: &Path) -> Result<
     if let Some(fault) = faults(&entries).iter().find(|fault| matches!(fault, LinkFault::Missing { .. })) {
         return Err(Exit::check(format!("{}: {fault}", path.display())));
     }
+    let mut link = connect(global, drive)?;
+    let present = link.presence()?;
+    let extra: Vec<u16> = present.iter().filter(|entry| !entries.contains_key(entry)).collect();
+    let count = entries_of(&entries);
+    let numbers = extra.iter().map(u16::to_string).collect::<Vec<_>>().join(", ");
+    let not_in_file =
+        if entries.is_empty() { "all that the drive has" } else { "which the file does not have" };
+    let deletes = |verb: &str| match extra.len() {
+        0 => String::new(),
+        1 => format!("; entry {numbers}, {not_in_file}, {verb}"),
+        _ => format!("; entries {numbers}, {not_in_file}, {verb}"),
+    };
     if global.dry_run {
-        out.plan(&format!("would write {} to RAM and flash", entries_of(&entries)));
+        let plan = format!("would write {count} to RAM and flash{}", deletes("would be deleted"));
+        out.document(json!({ "dry_run": true, "plan": plan, "deleted": extra }), || println!("{plan}"));
         return Ok(());
     }
-    out.confirm(global.yes, "Stop the MC software and write the command table to RAM and flash?")?;
-    let mut link = connect(global, drive)?;
+    out.confirm(
+        global.yes,
+        &format!(
+            "Stop the MC software and write the command table, {count}, to RAM and flash{}?",
+            deletes("will be deleted")
+        ),
+    )?;
     let (mut deleted, mut written) = (0, 0);
     let restored = stopped(&mut link, |link| {
-        let present = link.presence()?;
-        for entry in present.iter().filter(|entry| !entries.contains_key(entry)) {
+        for &entry in &extra {
             link.ask(Request::DeleteEntry { entry })?;
             deleted += 1;
         }
@@ -210,13 +227,13 @@ fn restore(out: &Output, global: &Global, drive: &Drive, path: &Path) -> Result<
         Ok(())
     });
     restored.map_err(|exit| {
-        let all = entries_of(&entries);
+        let others = counted(deleted, "other", "others");
         exit.context(&format!(
-            "{written} of {all} written and {deleted} others deleted in RAM, the same restore completes it"
+            "{written} of {count} written and {others} deleted in RAM, the same restore completes it"
         ))
     })?;
-    out.document(json!({ "entries": entries.len(), "saved": true }), || {
-        println!("{} written to RAM and flash", entries_of(&entries));
+    out.document(json!({ "entries": entries.len(), "deleted": extra, "saved": true }), || {
+        println!("{count} written to RAM and flash{}", deletes("deleted"));
     });
     Ok(())
 }

@@ -38,6 +38,8 @@ pub(super) fn parse(raw: &str) -> Result<Entry, String> {
 
 pub(super) fn save(path: &Path, entries: &Entries) -> Result<(), Exit> {
     let mut document = toml_edit::DocumentMut::new();
+    // First, so that a file that was cut off has no format or another number of entries.
+    document.insert("entries", toml_edit::value(entries.len() as i64));
     document.insert("format", toml_edit::value(FORMAT));
     let mut list = ArrayOfTables::new();
     for (number, entry) in entries {
@@ -66,7 +68,7 @@ pub(super) fn load(path: &Path) -> Result<Entries, Exit> {
             document.get("format").map_or("nothing".into(), |item| item.to_string().trim().to_owned());
         return Err(wrong(&format!("no command table file: format = {FORMAT} expected, {found} found")));
     }
-    known(&document, &["format", "entry"]).map_err(|error| wrong(&error))?;
+    known(&document, &["entries", "format", "entry"]).map_err(|error| wrong(&error))?;
     let list = match document.get("entry") {
         Some(item) => item.as_array_of_tables().ok_or_else(|| wrong("entry: [[entry]] expected"))?,
         None => &ArrayOfTables::new(),
@@ -84,7 +86,18 @@ pub(super) fn load(path: &Path) -> Result<Entries, Exit> {
             return Err(wrong(&format!("entry {number} occurs twice")));
         }
     }
-    Ok(entries)
+    match document.get("entries") {
+        None if entries.is_empty() => Err(wrong(
+            "it has no entries, so that a restore deletes all: entries = 0 in its head must say so",
+        )),
+        Some(said) if said.as_integer() != Some(entries.len() as i64) => Err(wrong(&format!(
+            "entries = {} in its head, {} there: the file was cut off or changed",
+            said.to_string().trim(),
+            if entries.len() == 1 { "1 is".into() } else { format!("{} are", entries.len()) }
+        ))),
+        // Older files have no number.
+        _ => Ok(entries),
+    }
 }
 
 fn entry(table: &Table) -> Result<Entry, String> {
