@@ -236,7 +236,7 @@ pub enum LinkFault {
         linked: u16,
     },
     /// A sequence comes back to one of its entries and never ends.
-    #[error("entry {entry} begins a loop of {length} entries")]
+    #[error("entry {entry} begins a loop of {length} {}", if *length == 1 { "entry" } else { "entries" })]
     Loop {
         /// Lowest entry of the loop.
         entry: u16,

@@ -102,3 +102,33 @@ fn a_table_restore_says_what_it_deletes() {
     linmot.run(&["table", "backup", "T.toml"]).ends(0);
     linmot.run(&["--yes", "table", "restore", "T.toml"]).ends(0).says("0 entries written");
 }
+
+/// A loop may be what the machine is meant to do, a link to nothing never is.
+#[test]
+fn a_loop_is_no_fault() {
+    let bench = Bench::new();
+    let _drive = drive(&bench, "--can=slcan-pty:LINE");
+    let linmot = Linmot { bench: &bench, carrier: CAN };
+    let set = |number: &str, link| {
+        linmot.run(&["table", "set", number, "--raw", &entry(link, "x")]).ends(0);
+    };
+    set("6", 6);
+    linmot
+        .run(&["table", "check"])
+        .ends(0)
+        .says("note: entry 6 begins a loop of 1 entry\n1 entry, 0 faults, 1 loop");
+    let json = linmot.json(&["table", "check"]);
+    assert_eq!(json["faults"], serde_json::json!([]));
+    assert_eq!((json["loops"][0]["entry"].as_u64(), json["loops"][0]["length"].as_u64()), (Some(6), Some(1)));
+    set("7", 99);
+    linmot
+        .run(&["table", "check"])
+        .ends(1)
+        .says("error: entry 7 is linked to entry 99, which does not exist\n");
+    set("8", 100);
+    linmot
+        .run(&["table", "check"])
+        .ends(1)
+        .says("3 entries, 2 faults, 1 loop")
+        .says("error: entry 7 is linked to entry 99, which does not exist; and 1 more");
+}

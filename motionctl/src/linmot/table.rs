@@ -133,37 +133,43 @@ fn write(link: &mut AnyLink, number: u16, entry: &Entry) -> Result<(), Exit> {
     Ok(())
 }
 
-fn faults(entries: &Entries) -> Vec<LinkFault> {
+/// Links that lead nowhere, and loops.
+fn links(entries: &Entries) -> (Vec<LinkFault>, Vec<LinkFault>) {
     let mut presence = Presence::default();
     entries.keys().for_each(|entry| presence.set(*entry, true));
     let mut found = Vec::new();
     let linked = |entry| entries.get(&entry).and_then(Entry::linked);
     check_links(&presence, linked, |fault| found.push(fault));
-    found
+    found.into_iter().partition(|fault| matches!(fault, LinkFault::Missing { .. }))
 }
 
 fn check(out: &Output, entries: &Entries) -> Result<(), Exit> {
-    let found = faults(entries);
-    let json: Vec<Value> = found
-        .iter()
-        .map(|fault| match fault {
-            LinkFault::Missing { entry, linked } => {
-                json!({ "entry": entry, "fault": "missing", "linked": linked, "message": fault.to_string() })
-            }
-            LinkFault::Loop { entry, length } => {
-                json!({ "entry": entry, "fault": "loop", "length": length, "message": fault.to_string() })
-            }
-            _ => json!({ "message": fault.to_string() }),
-        })
-        .collect();
-    out.document(json!({ "entries": entries.len(), "faults": json }), || {
-        found.iter().for_each(|fault| println!("{fault}"));
-        println!("{}, {}", entries_of(entries), counted(found.len(), "fault", "faults"));
-    });
     // A loop may be what the machine is meant to do; a missing entry never is.
-    match found.iter().find(|fault| matches!(fault, LinkFault::Missing { .. })) {
-        Some(fault) => Err(Exit::check(fault.to_string())),
-        None => Ok(()),
+    let (missing, loops) = links(entries);
+    let json = |fault: &LinkFault| match fault {
+        LinkFault::Missing { entry, linked } => {
+            json!({ "entry": entry, "fault": "missing", "linked": linked, "message": fault.to_string() })
+        }
+        LinkFault::Loop { entry, length } => {
+            json!({ "entry": entry, "length": length, "message": fault.to_string() })
+        }
+        _ => json!({ "message": fault.to_string() }),
+    };
+    let [faults, notes] = [&missing, &loops].map(|list| list.iter().map(json).collect::<Vec<Value>>());
+    out.document(json!({ "entries": entries.len(), "faults": faults, "loops": notes }), || {
+        missing.iter().for_each(|fault| println!("{fault}"));
+        loops.iter().for_each(|note| println!("note: {note}"));
+        println!(
+            "{}, {}, {}",
+            entries_of(entries),
+            counted(missing.len(), "fault", "faults"),
+            counted(loops.len(), "loop", "loops")
+        );
+    });
+    match missing.as_slice() {
+        [] => Ok(()),
+        [fault] => Err(Exit::check(fault.to_string())),
+        [first, rest @ ..] => Err(Exit::check(format!("{first}; and {} more", rest.len()))),
     }
 }
 
@@ -183,7 +189,7 @@ fn backup(out: &Output, global: &Global, drive: &Drive, path: &Path) -> Result<(
 
 fn restore(out: &Output, global: &Global, drive: &Drive, path: &Path) -> Result<(), Exit> {
     let entries = load(path)?;
-    if let Some(fault) = faults(&entries).iter().find(|fault| matches!(fault, LinkFault::Missing { .. })) {
+    if let Some(fault) = links(&entries).0.first() {
         return Err(Exit::check(format!("{}: {fault}", path.display())));
     }
     let mut link = connect(global, drive)?;
