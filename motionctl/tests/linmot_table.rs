@@ -132,3 +132,17 @@ fn a_loop_is_no_fault() {
         .says("3 entries, 2 faults, 1 loop")
         .says("error: entry 7 is linked to entry 99, which does not exist; and 1 more");
 }
+
+#[test]
+fn a_table_with_a_link_to_nothing_is_restored_as_it_was() {
+    let bench = Bench::new();
+    let _drive = drive(&bench, "--can=slcan-pty:LINE");
+    let linmot = Linmot { bench: &bench, carrier: CAN };
+    linmot.run(&["table", "set", "9", "--raw", &entry(10, "x")]).ends(0);
+    let words = "entry 9 is linked to entry 10, which does not exist";
+    linmot.run(&["table", "backup", "T.toml"]).ends(0).says(&format!("note: {words}"));
+    linmot.run(&["table", "delete", "9"]).ends(0);
+    let json = linmot.json(&["--yes", "table", "restore", "T.toml"]);
+    assert_eq!(json["remarks"], serde_json::json!([words]));
+    linmot.run(&["table", "compare", "T.toml"]).ends(0).says("1 equal");
+}

@@ -143,6 +143,11 @@ fn links(entries: &Entries) -> (Vec<LinkFault>, Vec<LinkFault>) {
     found.into_iter().partition(|fault| matches!(fault, LinkFault::Missing { .. }))
 }
 
+/// Links that lead nowhere are told and kept: what a backup has, a restore brings back.
+fn remark_missing(out: &Output, entries: &Entries) {
+    links(entries).0.iter().for_each(|fault| out.remark(fault.to_string()));
+}
+
 fn check(out: &Output, entries: &Entries) -> Result<(), Exit> {
     // A loop may be what the machine is meant to do; a missing entry never is.
     let (missing, loops) = links(entries);
@@ -176,6 +181,7 @@ fn check(out: &Output, entries: &Entries) -> Result<(), Exit> {
 fn backup(out: &Output, global: &Global, drive: &Drive, path: &Path) -> Result<(), Exit> {
     let entries = read(out, &mut connect(global, drive)?)?;
     let name = path.display().to_string();
+    remark_missing(out, &entries);
     if global.dry_run {
         out.plan(&format!("would write {} to {name}", entries_of(&entries)));
         return Ok(());
@@ -189,9 +195,7 @@ fn backup(out: &Output, global: &Global, drive: &Drive, path: &Path) -> Result<(
 
 fn restore(out: &Output, global: &Global, drive: &Drive, path: &Path) -> Result<(), Exit> {
     let entries = load(path)?;
-    if let Some(fault) = links(&entries).0.first() {
-        return Err(Exit::check(format!("{}: {fault}", path.display())));
-    }
+    remark_missing(out, &entries);
     let mut link = connect(global, drive)?;
     let present = link.presence()?;
     let extra: Vec<u16> = present.iter().filter(|entry| !entries.contains_key(entry)).collect();
