@@ -67,7 +67,8 @@ type Claim = std::os::unix::net::UnixDatagram;
 
 #[cfg(target_os = "linux")]
 fn claim(link: &Path) -> io::Result<Option<Claim>> {
-    use std::hash::{DefaultHasher, Hash as _, Hasher as _};
+    use core::hash::{Hash as _, Hasher as _};
+    use std::hash::DefaultHasher;
     use std::os::linux::net::SocketAddrExt as _;
     use std::os::unix::fs::MetadataExt as _;
     use std::os::unix::net::SocketAddr;
