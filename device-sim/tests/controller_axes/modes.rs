@@ -508,3 +508,16 @@ fn the_brake_opens_before_every_start() {
         starts(&mut bench, to(0));
     }
 }
+
+#[test]
+fn a_refused_order_leaves_the_move_under_way() {
+    let mut rig = Rig::enabled(&[]);
+    let first = rig.order(0, Order::MoveAbsolute { position: 200_000, velocity: None });
+    rig.run(Duration::from_millis(300));
+    let second = rig.order(0, Order::MoveAbsolute { position: 0, velocity: Some(9_999_999) });
+    rig.run(Duration::from_millis(50));
+    assert_eq!(rig.progress(0, second), Progress::Failed(MotionError::RANGE));
+    assert_eq!(rig.progress(0, first), Progress::Active);
+    rig.until("arrived", |rig| rig.progress(0, first) == Progress::Done);
+    assert_eq!(rig.progress(0, second), Progress::Failed(MotionError::RANGE));
+}

@@ -128,6 +128,10 @@ pub struct AxisAccess {
     waiting: Option<(u32, Order)>,
     /// The last order that the axis has taken, and how it went.
     taken: Option<(u32, Progress)>,
+    /// The one before it, which goes on where the axis refuses the new one.
+    before: Option<(u32, Progress)>,
+    /// The last order that the axis has refused.
+    refused: Option<(u32, MotionError)>,
     last: u32,
     /// Levels and pulses that are no orders.
     pub(crate) power: bool,
@@ -157,7 +161,7 @@ impl AxisAccess {
         Ok(())
     }
 
-    /// Gives an order; it takes the place of the one before.
+    /// Gives an order; it takes the place of the one before, unless the axis refuses it.
     ///
     /// # Errors
     /// The axis is not activated, not enabled, in a failure, or held by a stop.
@@ -185,7 +189,10 @@ impl AxisAccess {
         match (self.waiting, self.taken) {
             (Some((waiting, _)), _) if waiting == ticket => Progress::Waiting,
             (_, Some((taken, progress))) if taken == ticket => progress,
-            _ => Progress::Aborted,
+            _ => match self.refused {
+                Some((refused, error)) if refused == ticket => Progress::Failed(error),
+                _ => Progress::Aborted,
+            },
         }
     }
 
@@ -214,14 +221,24 @@ impl AxisAccess {
         }
     }
 
-    /// The order that the axis is to take now. What it was carrying out is aborted.
+    /// The order that the axis is to take now. What it was carrying out is aborted, unless it
+    /// [refuses](Self::refuse) the new one.
     pub(crate) const fn take(&mut self) -> Option<Order> {
         match self.waiting.take() {
             Some((ticket, order)) => {
+                self.before = self.taken;
                 self.taken = Some((ticket, Progress::Active));
                 Some(order)
             }
             None => None,
+        }
+    }
+
+    /// The axis does not carry out the order that it has just taken: the one before goes on.
+    pub(crate) const fn refuse(&mut self, error: MotionError) {
+        if let Some((ticket, _)) = self.taken {
+            self.refused = Some((ticket, error));
+            self.taken = self.before;
         }
     }
 

@@ -2,18 +2,16 @@
 
 use super::settings::{Calibration, JogVelocities, Mode};
 use super::{Axis, Home, Motion};
-use crate::application::{MotionError, Order, Progress};
+use crate::application::{MotionError, Order};
 use crate::control::{ActualSource, AxisOutput};
 use crate::failure::READING_LOST;
 use crate::input::{ActualValue, Reading};
 use crate::trajectory::Goal;
 
 impl Axis {
-    /// Begins an order, or ends it as refused; a motion under way then goes on.
+    /// Begins an order, or refuses it; a motion under way then goes on.
     pub(super) fn order(&mut self, order: Order, inputs: &[ActualValue; 6], output: &mut AxisOutput) {
-        if let Err(error) = self.begin(order, inputs, output) {
-            output.ended = Some(Progress::Failed(error));
-        }
+        output.refused = self.begin(order, inputs, output).err();
     }
 
     fn begin(

@@ -2,7 +2,7 @@
 
 use lb2::code::Failure;
 
-use crate::application::{AxisStatus, Order, Progress};
+use crate::application::{AxisStatus, MotionError, Order, Progress};
 use crate::input::ActualValue;
 use crate::io::DigitalInputs;
 use crate::output::Command;
@@ -54,7 +54,7 @@ pub struct AxisInput {
     pub held: bool,
     /// Acknowledges a failure.
     pub reset: bool,
-    /// A new order; it takes the place of the one before.
+    /// A new order; it takes the place of the one before, unless it is refused.
     pub order: Option<Order>,
     /// The application has stopped in this cycle.
     pub stop: Option<PlcStop>,
@@ -69,6 +69,8 @@ pub struct AxisOutput {
     pub command: Command,
     /// For the application.
     pub status: AxisStatus,
+    /// Why the new order was refused; the one before goes on.
+    pub refused: Option<MotionError>,
     /// How the present order ended in this cycle.
     pub ended: Option<Progress>,
     /// Whether its input is to calibrate on the reference signal.

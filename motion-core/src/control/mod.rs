@@ -235,6 +235,9 @@ impl<A: AxisControl> Control<A> {
                 log(StoredFailure { axis: number, failure });
             }
             access.set_status(output.status);
+            if let Some(error) = output.refused {
+                access.refuse(error);
+            }
             if let Some(progress) = output.ended {
                 access.end(progress);
             }

@@ -79,6 +79,25 @@ fn the_end_shows_for_one_cycle_when_execute_went_before() {
     assert_eq!(bits(rig.run(|plc| block.call(plc))), IDLE);
 }
 
+/// The axis moves on, and its first order is done in the end.
+#[test]
+fn an_order_that_the_axis_refuses_leaves_the_one_before() {
+    let mut rig = Rig::new(State::DiscreteMotion);
+    let mut first = MoveAbsolute { position: 500, execute: true, ..MoveAbsolute::new(1) };
+    let mut second = MoveAbsolute { velocity: Some(u32::MAX), execute: true, ..MoveAbsolute::new(1) };
+    rig.run(|plc| first.call(plc));
+    rig.axis().take();
+    rig.run(|plc| second.call(plc));
+    rig.axis().take();
+    rig.axis().refuse(MotionError::RANGE);
+    let outputs = rig.run(|plc| second.call(plc));
+    assert_eq!((bits(outputs), outputs.error_id), (ERROR, MotionError::RANGE));
+    assert_eq!(bits(rig.run(|plc| first.call(plc))), ACTIVE);
+    rig.axis().end(Progress::Done);
+    assert_eq!(bits(rig.run(|plc| first.call(plc))), DONE);
+    assert_eq!(bits(rig.run(|plc| second.call(plc))), ERROR);
+}
+
 #[test]
 fn a_later_order_aborts_the_one_before() {
     let mut rig = Rig::new(State::Standstill);

@@ -34,7 +34,7 @@ pub(super) struct Rig {
     /// Velocities of slow and fast, units/s.
     signals: (f64, f64),
     pub(super) ms: u32,
-    /// Progress of orders, and when they ended, ms.
+    /// How orders ended or were refused, and when, ms.
     pub(super) ended: Vec<(u32, Progress)>,
     failures: Vec<Failure>,
 }
@@ -106,6 +106,9 @@ impl Rig {
         self.velocity += (told - self.velocity) * share.min(1.0);
         self.position += self.velocity * 0.001;
         self.ms += 1;
+        if let Some(error) = self.output.refused {
+            self.ended.push((self.ms, Progress::Failed(error)));
+        }
         if let Some(progress) = self.output.ended {
             self.ended.push((self.ms, progress));
         }
