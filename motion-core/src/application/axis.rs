@@ -258,6 +258,11 @@ impl AxisAccess {
         }
     }
 
+    /// The axis is not activated any more: not enabled, without orders and status.
+    pub(crate) fn deactivate(&mut self) {
+        *self = Self { last: self.last, ..Self::default() };
+    }
+
     pub(crate) const fn set_status(&mut self, status: AxisStatus) {
         self.status = status;
     }

@@ -107,9 +107,7 @@ impl<A: AxisControl + Default> Control<A> {
         control.configure(values);
         control
     }
-}
 
-impl<A: AxisControl> Control<A> {
     /// Takes over parameters; everything may change while running.
     pub fn configure(&mut self, values: &Values) {
         self.settings = Settings::read(values);
@@ -121,10 +119,16 @@ impl<A: AxisControl> Control<A> {
             output.configure(output::Settings::read(values, at));
         }
         for (at, axis) in self.axes.iter_mut().enumerate() {
+            let (access, route) = (self.access.get_mut(at), self.settings.axes.get(at));
+            let activated = route.is_some_and(Option::is_some);
+            // An axis that was taken out of use begins anew.
+            if let Some(access) = access
+                && core::mem::replace(&mut access.activated, activated)
+                && !activated
+            {
+                *axis = A::default();
+            }
             axis.configure(values, at, self.settings.cycle);
-        }
-        for (access, route) in self.access.iter_mut().zip(&self.settings.axes) {
-            access.activated = route.is_some();
         }
     }
 
@@ -196,9 +200,14 @@ impl<A: AxisControl> Control<A> {
         let mut commands: [Option<(Command, bool)>; COUNT] = Default::default();
         self.quantities.iter_mut().for_each(|own| own.shift = 0);
         for at in 0..COUNT {
-            let (Some(axis), Some(access), Some(&Some(route))) =
+            let (Some(axis), Some(access), Some(&route)) =
                 (self.axes.get_mut(at), self.access.get_mut(at), self.settings.axes.get(at))
             else {
+                continue;
+            };
+            let Some(route) = route else {
+                access.deactivate();
+                self.armed.get_mut(at).map(core::mem::take);
                 continue;
             };
             let input = AxisInput {

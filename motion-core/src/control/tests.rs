@@ -291,7 +291,25 @@ fn models_have_their_inputs() {
     }
 }
 
-/// Everything can change at run time: an axis is taken out and comes back where it is.
+/// Nothing is left of what it was: neither state nor order nor enable.
+#[test]
+fn an_axis_that_is_taken_out_of_use_is_disabled() {
+    let mut rig = rig(Model::Gel8230, &[(642, 1000)]);
+    rig.drive(1, 500);
+    let order = Order::MoveVelocity { velocity: 400 };
+    let ticket = rig.control.access(0).unwrap().order(order).unwrap();
+    rig.values.set(600, 0).unwrap();
+    rig.control.configure(&rig.values);
+    rig.idle();
+    assert_eq!(rig.control.status(0), Some(&AxisStatus::default()));
+    assert_eq!(rig.control.access(0).unwrap().progress(ticket), Progress::Aborted);
+    rig.values.set(600, 1).unwrap();
+    rig.control.configure(&rig.values);
+    rig.idle();
+    assert!(!rig.last(0).power && rig.last(0).order.is_none());
+}
+
+/// Everything can change at run time: an axis is taken out and comes back where it is, not enabled.
 #[test]
 fn parameters_change_while_running() {
     let mut rig = rig(Model::Gel8230, &[(642, 1000)]);
@@ -303,7 +321,8 @@ fn parameters_change_while_running() {
     rig.values.set(600, 1).unwrap();
     rig.values.set(480, 5_000).unwrap();
     rig.control.configure(&rig.values);
-    assert_eq!((rig.idle().terminals.analog[0], rig.last(0).actual.position), (2_500, 77));
+    assert_eq!((rig.idle().terminals.analog[0], rig.last(0).actual.position), (0, 77));
+    assert_eq!(rig.drive(1, 500).terminals.analog[0], 2_500);
 }
 
 /// Calibration needs the axis' consent, and the offset is there to be kept.
