@@ -130,6 +130,22 @@ fn a_client_moves_an_axis_and_its_loss_halts_it() {
     }
 }
 
+/// FFFFFFFFh is no velocity, as 7FFFFFFFh is none: the axis stays where it is, with error 106h.
+#[test]
+fn a_negative_velocity_is_out_of_range() {
+    let (_running, _said, address) = start();
+    let mut client = Client(TcpStream::connect(&address).unwrap());
+    for velocity in [-1, i32::MAX, i32::MIN] {
+        client.command(1, 0, 0);
+        client.until("no order, no error", |(status, error, _)| status & 0b11 == 0b11 && error == 0);
+        client.command(0b11, 30_000, velocity);
+        client.until("refused", |(status, error, position)| {
+            assert_eq!(position, 0, "{velocity}");
+            status & 1 << 7 != 0 && error == 0x106
+        });
+    }
+}
+
 /// Random bytes, requests cut short, wrong lengths, connections that end in the middle: each ends its own
 /// connection at most; another client is served all the while, and the axis does not move.
 #[test]

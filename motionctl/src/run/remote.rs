@@ -8,7 +8,9 @@
 //! | 0 | control word | status word |
 //! | 2 | not used | error number |
 //! | 4 | position to move to, 32 bits | actual position, 32 bits |
-//! | 8 | velocity, 32 bits, 0 = V Work | actual velocity, 32 bits |
+//! | 8 | velocity, 32 bits without sign, 0 = V Work | actual velocity, 32 bits |
+//!
+//! A velocity above V max., and so also what would be a negative one, is refused with error 106h.
 //!
 //! Control word: 0 enable, 1 move to the position (rising edge), 2 halt (rising edge), 3 stop, 4 jog
 //! forward, 5 jog backward, 6 jog fast, 7 home (rising edge), 8 reset (rising edge). Status word: 0
@@ -87,7 +89,7 @@ impl Axis {
         self.power.enable = bit(0);
         self.motion.execute = armed && bit(1);
         self.motion.position = position;
-        self.motion.velocity = u32::try_from(velocity).ok().filter(|velocity| *velocity > 0);
+        self.motion.velocity = (velocity != 0).then_some(velocity as u32);
         self.halt.execute = !live || bit(2);
         self.stop.execute = bit(3);
         (self.jog.forward, self.jog.backward, self.jog.fast) = (armed && bit(4), armed && bit(5), bit(6));
