@@ -14,9 +14,6 @@ use std::thread::JoinHandle;
 use std::time::Instant;
 
 use motion_core::io::{BusKind, FieldBus, MAX_IMAGE};
-use rmodbus::consts::ModbusFunction;
-use rmodbus::server::{ModbusFrame, Read as Wanted, Write as Given};
-use rmodbus::{ErrorKind, ModbusProto};
 
 use crate::exit::Exit;
 
@@ -24,6 +21,8 @@ use crate::exit::Exit;
 const HEADER: usize = 6;
 /// Longest request or answer of Modbus TCP.
 const LONGEST: usize = 260;
+/// Exception code of a register that there is not.
+const ILLEGAL_ADDRESS: u8 = 2;
 /// Clients at one time.
 const CLIENTS: usize = 8;
 /// How long a client may take to accept an answer.
@@ -193,7 +192,7 @@ fn serve(
             return Ok(());
         }
         let Some(request) = request.get(..HEADER + len) else { return Ok(()) };
-        let Ok(answer) = answer(request, unit, images) else { return Ok(()) };
+        let Some(answer) = answer(request, unit, images) else { return Ok(()) };
         heard();
         stream.write_all(&answer)?;
         if stop.load(Ordering::Relaxed) {
@@ -202,41 +201,50 @@ fn serve(
     }
 }
 
-/// The answer to a request; empty for one to another unit.
-fn answer(request: &[u8], unit: u8, images: &Mutex<Images>) -> Result<Vec<u8>, ErrorKind> {
-    let asked = request.get(HEADER).copied().unwrap_or(0);
+/// The answer to a request; empty for one to another unit, `None` where it is no Modbus.
+fn answer(request: &[u8], unit: u8, images: &Mutex<Images>) -> Option<Vec<u8>> {
+    let (&[t0, t1, 0, 0, _, _, asked], request) = request.split_first_chunk()? else { return None };
     if unit != 0 && asked != unit {
-        return Ok(Vec::new());
+        return Some(Vec::new());
     }
-    if let Some(code) = misshapen(request.get(HEADER + 1..).unwrap_or(&[])) {
-        let (transaction, function) = (request.get(..4), request.get(HEADER + 1));
-        let mut answer = transaction.unwrap_or(&[]).to_vec();
-        answer.extend([0, 3, asked, function.copied().unwrap_or(0) | 0x80, code]);
-        return Ok(answer);
+    let function = request.first()?;
+    let body = carry_out(request, &mut lock(images)).unwrap_or_else(|code| vec![function | 0x80, code]);
+    // At most 253 bytes, as a request has.
+    let mut answer = vec![t0, t1, 0, 0, 0, body.len() as u8 + 1, asked];
+    answer.extend(body);
+    Some(answer)
+}
+
+/// Reads or writes registers: function and data of the answer, or the exception code.
+fn carry_out(request: &[u8], images: &mut Images) -> Result<Vec<u8>, u8> {
+    if let Some(code) = misshapen(request) {
+        return Err(code);
     }
-    let mut answer = Vec::with_capacity(LONGEST);
-    let mut frame = ModbusFrame::new(asked, request, ModbusProto::TcpUdp, &mut answer);
-    frame.parse()?;
-    if frame.processing_required {
-        let mut images = lock(images);
-        images.heard = Some(Instant::now());
-        let holding = matches!(frame.func, ModbusFunction::GetHoldings);
-        if frame.readonly {
-            let result = read(frame.get_external_read()?, holding, &images);
-            frame.process_external_read(result)?;
-        } else {
-            let result = frame.get_external_write().and_then(|given| write(&given, &mut images));
-            frame.process_external_write(result)?;
+    images.heard = Some(Instant::now());
+    let word = |at: usize| u16::from_be_bytes([request[at], request[at + 1]]);
+    let function = request[0];
+    let count = if function == 6 { 1 } else { word(3) };
+    let (image, size) = match function {
+        4 => (&mut images.output, images.sizes.1),
+        _ => (&mut images.input, images.sizes.0),
+    };
+    let registers =
+        place(word(1), count, size).and_then(|place| image.get_mut(place)).ok_or(ILLEGAL_ADDRESS)?;
+    match function {
+        3 | 4 => Ok([&[function, registers.len() as u8], &*registers].concat()),
+        6 => {
+            registers.copy_from_slice(&request[3..]);
+            Ok(request.to_vec())
+        }
+        _ => {
+            registers.copy_from_slice(&request[6..]);
+            Ok(request[..5].to_vec())
         }
     }
-    if frame.response_required {
-        frame.finalize_response()?;
-    }
-    Ok(answer)
 }
 
 /// The exception code that a request earns by its shape alone: a function that there is not (1), a count
-/// or a length that does not fit (3). The library relies on the counts being right.
+/// or a length that does not fit (3).
 fn misshapen(request: &[u8]) -> Option<u8> {
     let count = request.get(3..5).and_then(|count| count.try_into().ok()).map(u16::from_be_bytes);
     let good = match (request.first()?, count) {
@@ -251,31 +259,11 @@ fn misshapen(request: &[u8]) -> Option<u8> {
     (!good).then_some(3)
 }
 
-/// Bytes of `count` registers from `address` on, within an image of `size` bytes.
-fn place(address: u16, count: u16, size: usize) -> Result<core::ops::Range<usize>, ErrorKind> {
+/// Bytes of `count` registers from `address` on, if they are within an image of `size` bytes.
+fn place(address: u16, count: u16, size: usize) -> Option<core::ops::Range<usize>> {
     let begin = 2 * usize::from(address);
     let end = begin + 2 * usize::from(count);
-    if end > size.next_multiple_of(2) { Err(ErrorKind::IllegalDataAddress) } else { Ok(begin..end) }
-}
-
-fn read(wanted: Wanted<'_>, holding: bool, images: &Images) -> Result<(), ErrorKind> {
-    let Wanted::Words(words) = wanted else { return Err(ErrorKind::IllegalFunction) };
-    let (image, size) =
-        if holding { (&images.input, images.sizes.0) } else { (&images.output, images.sizes.1) };
-    let from = image.get(place(words.address, words.count, size)?).ok_or(ErrorKind::IllegalDataAddress)?;
-    words.buf.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
-    Ok(())
-}
-
-fn write(given: &Given<'_>, images: &mut Images) -> Result<(), ErrorKind> {
-    let Given::Words(words) = given else { return Err(ErrorKind::IllegalFunction) };
-    if words.data.len() != 2 * usize::from(words.count) {
-        return Err(ErrorKind::IllegalDataValue);
-    }
-    let place = place(words.address, words.count, images.sizes.0)?;
-    let to = images.input.get_mut(place).ok_or(ErrorKind::IllegalDataAddress)?;
-    to.iter_mut().zip(words.data).for_each(|(to, from)| *to = *from);
-    Ok(())
+    (end <= size.next_multiple_of(2)).then_some(begin..end)
 }
 
 #[cfg(test)]
@@ -334,6 +322,20 @@ mod tests {
         assert_eq!(lock(&images).input[..4], [0; 4]);
         assert!(ask(&images, 1, &[2, 3, 0, 0, 0, 1]).is_empty(), "another unit");
         assert_eq!(ask(&images, 0, &[2, 3, 0, 0, 0, 1]), [2, 3, 2, 0, 0], "0 answers all");
+    }
+
+    /// 123 registers are as many as one request writes: 259 bytes.
+    #[test]
+    fn the_longest_request_is_carried_out() {
+        let images = images(512, 512);
+        for count in 121..=123_u8 {
+            let data: Vec<u8> = (0..2 * count).collect();
+            let request = [&[1, 16, 0, 0, 0, count, 2 * count][..], &data].concat();
+            assert_eq!(ask(&images, 1, &request), [1, 16, 0, 0, 0, count], "{count} registers");
+            assert_eq!(lock(&images).input[..data.len()], data);
+        }
+        assert_eq!(ask(&images, 1, &[1, 3, 0, 0, 0, 125]).len(), 253);
+        assert_eq!(ask(&images, 0, &[0, 3, 0, 0, 0, 1]), [0, 3, 2, 0, 1], "0 is a unit too");
     }
 
     #[test]
