@@ -34,7 +34,10 @@ pub(super) struct Config {
 
 /// A parameter's value: in display units, as LB2 has it without the decimal point, or as people write it.
 #[derive(Debug, Deserialize)]
-#[serde(untagged, expecting = "a parameter is a whole number in display units, or a text")]
+#[serde(
+    untagged,
+    expecting = "a whole number without a decimal point, or a text such as 654 = \"0.5\", expected"
+)]
 enum Setting {
     Number(i32),
     Text(String),
