@@ -314,6 +314,23 @@ velocity = 100000
     assert!(steepest <= 101.0, "{steepest} in a cycle: {}", ran.stdout());
 }
 
+/// Status 1, and how many; a step in whose place another one came has not failed.
+#[test]
+fn a_step_that_fails_is_a_check_that_failed() {
+    let bench = Bench::new();
+    let base = "[parameters]\n0 = 1\n108 = 0\n109 = 0\n601 = 0\n602 = 0\n606 = 8\n642 = 1000\n654 = 100\n";
+    let step = |at: f64, line: &str| format!("[[program]]\nat = {at}\naxis = 1\n{line}\n");
+    let power = step(0.05, "do = \"power\"");
+    let far = step(0.1, "do = \"move-absolute\"\nposition = 100000\nvelocity = 100");
+    let run = |steps: &[&str]| run(&bench, &(base.to_string() + &steps.concat()), &["--for", "0.3"]);
+    run(&[&power, &far, &step(0.15, "do = \"halt\"")]).ends(0).says("move-absolute: aborted");
+    run(&[&far]).ends(1).says("error 102h").says("a step of the program failed");
+    let fast = step(0.15, "do = \"move-velocity\"\nvelocity = 9999");
+    let homeless = step(0.2, "do = \"home\"");
+    let ran = run(&[&power, &far, &fast, &homeless]).ends(1).says("error 106h").says("error 105h");
+    assert!(!ran.says("2 steps of the program failed").stdout().contains("aborted"));
+}
+
 /// Every mistake is named with its place, with status 2, before anything is begun.
 #[test]
 fn mistakes_in_a_configuration_are_named() {
@@ -336,7 +353,7 @@ fn mistakes_in_a_configuration_are_named() {
         ("[controller]\ndevice_number = 32\n".into(), &["= 32"]),
         ("[parameters]\nnonsense = 1\n".into(), &["nonsense"]),
         ("[parameters]\n50 = 1\n".into(), &["50"]),
-        ("[parameters]\n642 = 1.5\n".into(), &["line 2", "whole number"]),
+        ("[parameters]\n654 = 0.5\n".into(), &["line 2", "whole number", "654 = \"0.5\""]),
         ("[parameters]\n642 = 99999999999\n".into(), &["line 2"]),
         ("[parameters]\n642 = 1\n\"V max.@Axis 1\" = 2\n".into(), &["set twice", "V max."]),
         ("[parameters]\n300 = \"Chief\"\n".into(), &["Chief"]),

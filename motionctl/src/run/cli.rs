@@ -20,7 +20,8 @@ const FILE: &str = r#"CONFIG.toml:
                         numerator = -3, denominator = 7, for = seconds
     write               bus = "can1", object = 1 (OUT 1 to 4), data = "A5", period = seconds
     send                bus = "can1", channel = 1 (CAN Link, 1 to 14), data = "E2 04", period = seconds
-    scan                bus = "can1": as by hand, with all axes at rest"#;
+    scan                bus = "can1": as by hand, with all axes at rest
+                        A step that ends with an error makes the exit status 1."#;
 
 #[derive(Debug, Args)]
 #[command(after_long_help = FILE)]

@@ -223,6 +223,8 @@ fn control(
     let mut told: [data::Told; 2] = Default::default();
     let mut outputs = Outputs::default();
     let mut stored = controller.failures().total();
+    // Steps of the program.
+    let mut failed = 0;
     let mut ending = None;
     let mut before = Duration::ZERO;
     loop {
@@ -239,6 +241,7 @@ fn control(
         let at_rest = (0..usize::from(AXES)).filter_map(|axis| controller.axis_status(axis)).all(resting);
         for at in program.take_scans() {
             let outcome = if at_rest && controller.scan(at) { Outcome::Done } else { Outcome::Refused };
+            failed += usize::from(outcome.is_failure());
             report.step(now, (Subject::Bus(at), Action::Scan, outcome));
         }
         let inputs = machine.run(cycle.as_millis() as u32, &outputs);
@@ -271,6 +274,7 @@ fn control(
         let list = controller.failures().stored();
         list.iter().skip(list.len().saturating_sub(new)).for_each(|&failure| report.failure(now, failure));
         for ended in program.ended.drain(..) {
+            failed += usize::from(ended.2.is_failure());
             report.step(now, ended);
         }
         report.cycle(now, &pace.jitter);
@@ -290,5 +294,10 @@ fn control(
     }
     report.end(pace.now(), &pace.jitter);
     // What the last moments brought is retained like a battery would.
-    controller.advance(Duration::from_secs(60)).map_err(|error| Exit::trouble(error.to_string()))
+    controller.advance(Duration::from_secs(60)).map_err(|error| Exit::trouble(error.to_string()))?;
+    match failed {
+        0 => Ok(()),
+        1 => Err(Exit::check("a step of the program failed")),
+        _ => Err(Exit::check(format!("{failed} steps of the program failed"))),
+    }
 }

@@ -28,6 +28,13 @@ pub(super) enum Outcome {
     Refused,
 }
 
+impl Outcome {
+    /// Whether the step did not do what it was for. One in whose place another came is none of these.
+    pub(super) const fn is_failure(self) -> bool {
+        matches!(self, Self::Failed(_) | Self::Refused)
+    }
+}
+
 /// What a step acts on: an axis, 1…6, or a bus, 0 or 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Subject {
