@@ -24,5 +24,5 @@ pub mod trajectory;
 pub use axis::Axis;
 pub use controller::{
     AXES, CONFIGURATION_PASSWORD, ComPort, Controller, Model, OS_VERSION, Parity, Reset, ResetError,
-    SERVICE_PASSWORD, STORAGE_LEN, SerialPort, WrongPassword,
+    SERVICE_PASSWORD, STORAGE_LEN, SerialPort, WrongPassword, is_damaged, stored_model,
 };

@@ -78,6 +78,10 @@ impl Storage for alloc::vec::Vec<u8> {
 
 /// Commit byte of a complete slot; anything else means that the slot is not complete.
 const COMPLETE: u8 = 0xA5;
+/// Commit byte of a slot whose save has begun.
+const BEGUN: u8 = 0;
+/// Commit byte of a slot never used.
+const ERASED: u8 = 0xFF;
 /// Commit byte, 3 bytes unused, sequence number, check sum.
 const HEADER: usize = 12;
 const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
@@ -104,6 +108,22 @@ impl Record {
 
     const fn slot_len(&self) -> usize {
         HEADER + 4 * self.words
+    }
+
+    /// Whether a slot is not what a save, begun or done, or none has left there: a bit has changed since.
+    ///
+    /// # Errors
+    /// [`StorageError`] if the memory cannot be read.
+    pub fn is_damaged(&self, storage: &(impl Storage + ?Sized)) -> Result<bool, StorageError> {
+        for slot in 0..2 {
+            let mut commit = [0];
+            storage.read(self.base + slot * self.slot_len(), &mut commit)?;
+            let [commit] = commit;
+            if !matches!(commit, BEGUN | ERASED) && self.sequence(storage, slot)?.is_none() {
+                return Ok(true);
+            }
+        }
+        Ok(false)
     }
 
     /// Sequence number of a slot that is complete and whose check sum is right.
@@ -160,7 +180,7 @@ impl Record {
         };
         let base = self.base + slot * self.slot_len();
         let sequence = sequence.to_le_bytes();
-        storage.write(base, &[0])?;
+        storage.write(base, &[BEGUN])?;
         storage.sync()?;
         let mut crc = CRC.digest();
         crc.update(&sequence);
@@ -230,6 +250,7 @@ mod tests {
                 let now = loaded(&cut.bytes);
                 assert!(now == old || now == new, "cut after {left} bytes: {now:?}");
                 assert!(!done || now == new);
+                assert_eq!(RECORD.is_damaged(&cut.bytes), Ok(false), "cut after {left} bytes");
                 seen = (seen.0 | (now == old), seen.1 | (now == new));
                 // The next save works from whatever the cut has left.
                 RECORD.save(&mut cut.bytes, &state(77)).unwrap();
@@ -253,6 +274,7 @@ mod tests {
                 let mut bytes = bytes.clone();
                 bytes[at] ^= 1 << bit;
                 let unused = (second + 1..second + 4).contains(&at);
+                assert_eq!(RECORD.is_damaged(&bytes), Ok(!unused));
                 assert_eq!(loaded(&bytes), Some(state(if unused { 2 } else { 1 })), "byte {at}, bit {bit}");
             }
         }

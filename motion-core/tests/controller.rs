@@ -8,7 +8,7 @@ use motion_core::application::Plc;
 use motion_core::io::{Inputs, Terminal};
 use motion_core::parameters::{Values, iter};
 use motion_core::storage::{Storage, StorageError};
-use motion_core::{Controller, Model, Reset, ResetError, STORAGE_LEN};
+use motion_core::{Controller, Model, Reset, ResetError, STORAGE_LEN, is_damaged, stored_model};
 
 type Virtual = Controller<Vec<u8>, Vec<u8>>;
 
@@ -41,6 +41,32 @@ fn parameter_005_is_the_device_number() {
         assert_eq!(i32::from(controller.device_number()), number);
     }
     assert_eq!(new().write_parameter(5, 32).code, LoaderCode(0x81));
+}
+
+/// Parameters that cannot be read any more are those saved before, and that is told.
+#[test]
+fn a_damaged_memory_is_told_and_knows_its_model() {
+    assert_eq!(stored_model(&new().power_off()), None);
+    let [first, mut storage] = [7, 8].map(|saves| {
+        let mut controller = new();
+        for number in 7..=saves {
+            controller.write_parameter(5, number);
+            controller.call_loader();
+            controller.save_parameters().unwrap();
+        }
+        controller.advance(Duration::ZERO).unwrap();
+        controller.power_off()
+    });
+    assert_eq!((stored_model(&storage), is_damaged(&storage)), (Some(8231), Ok(false)));
+    // In the second slot, where the first save has left nothing.
+    let at = first.iter().zip(&storage).rposition(|(first, second)| first != second).unwrap();
+    storage[at] ^= 1;
+    assert_eq!(is_damaged(&storage), Ok(true));
+    let mut controller = on(storage);
+    assert_eq!(controller.device_number(), 7);
+    // The next save takes the damaged slot.
+    controller.save_parameters().unwrap();
+    assert_eq!(is_damaged(&controller.power_off()), Ok(false));
 }
 
 /// Writes go to RAM, the loader makes them effective, 35h makes them permanent.

@@ -49,8 +49,7 @@ pub(crate) fn start(out: &Output, global: &Global, command: &Sim) -> Result<(), 
     let stop = stop_flag()?;
     match state {
         Some(path) => {
-            let storage =
-                FileStorage::open(path).map_err(|error| Exit::file(&path.display().to_string(), &error))?;
+            let storage = FileStorage::of(out, path, model)?;
             controller(out, model, storage, &endpoint, device, &stop)
         }
         None => controller(out, model, vec![0xFF; STORAGE_LEN], &endpoint, device, &stop),

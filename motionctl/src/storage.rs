@@ -4,14 +4,33 @@ use std::fs::File;
 use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::Path;
 
-use motion_core::STORAGE_LEN;
 use motion_core::storage::{Storage, StorageError};
+use motion_core::{Model, STORAGE_LEN, is_damaged, stored_model};
+
+use crate::exit::Exit;
+use crate::output::Output;
 
 /// Non-volatile memory in a file, which no other program may use meanwhile.
 pub(crate) struct FileStorage(File);
 
 impl FileStorage {
-    pub(crate) fn open(path: &Path) -> std::io::Result<Self> {
+    /// That of a controller of this model, and no other; told where it is damaged.
+    pub(crate) fn of(out: &Output, path: &Path, model: Model) -> Result<Self, Exit> {
+        let name = path.display();
+        let trouble = |error: &dyn core::fmt::Display| Exit::file(&name.to_string(), error);
+        let storage = Self::open(path).map_err(|error| trouble(&error))?;
+        if let Some(stored) = stored_model(&storage).filter(|stored| *stored != model.number()) {
+            return Err(trouble(&format!("the state of a GEL {stored}, GEL {} expected", model.number())));
+        }
+        if is_damaged(&storage).map_err(|error| trouble(&error))? {
+            out.remark(format!(
+                "{name} is damaged: what cannot be read of it is as it was saved before, or as delivered"
+            ));
+        }
+        Ok(storage)
+    }
+
+    fn open(path: &Path) -> std::io::Result<Self> {
         let file = File::options().read(true).write(true).create(true).truncate(false).open(path)?;
         file.try_lock().map_err(|_| std::io::Error::other("in use by another program"))?;
         match file.metadata()?.len() {

@@ -331,6 +331,27 @@ fn a_step_that_fails_is_a_check_that_failed() {
     assert!(!ran.says("2 steps of the program failed").stdout().contains("aborted"));
 }
 
+/// A state is that of one model; a bit that has changed in it is told.
+#[test]
+fn a_state_that_is_damaged_or_of_another_model_is_told() {
+    let bench = Bench::new();
+    let state = "[controller]\nstate = \"state\"\n";
+    let start = |more: &str| run(&bench, &(state.to_string() + more), &["--for", "0.05"]);
+    assert!(!start("").ends(0).stderr().contains("flash.bin"));
+    start("model = 8231\n").ends(5).says("flash.bin: the state of a GEL 8230, GEL 8231 expected");
+    let line = ["sim", "controller", "--serial", "pty:LINE", "--state", "state/flash.bin"];
+    bench.run(&[&line[..], &["--model", "8231"]].concat()).ends(5).says("the state of a GEL 8230");
+    {
+        let _device = bench.device(&line);
+        bench.run(&["params", "set", "--port", "LINE", "642", "5", "--save"]).ends(0);
+    }
+    let path = bench.path("state/flash.bin");
+    let mut flash = std::fs::read(&path).unwrap();
+    flash[100] ^= 1;
+    std::fs::write(&path, flash).unwrap();
+    start("").ends(0).says("flash.bin is damaged: ");
+}
+
 /// Every mistake is named with its place, with status 2, before anything is begun.
 #[test]
 fn mistakes_in_a_configuration_are_named() {

@@ -38,8 +38,10 @@ const STATUS: Record = Record::new(IMAGE.end(), STATUS_WORDS);
 const STATUS_WORDS: usize = 3 + AXES as usize + MAX_FAILURES;
 /// Flash banks 15 and 16.
 const FLASH: usize = STATUS.end();
+/// Number of the model, whose memory it is.
+const MODEL: Record = Record::new(FLASH + 2 * BANK_LEN, 1);
 /// Bytes of [`Storage`] that a controller needs.
-pub const STORAGE_LEN: usize = FLASH + 2 * BANK_LEN;
+pub const STORAGE_LEN: usize = MODEL.end();
 
 /// Places of the drives of CAN 1 (objects 1 and 2) and CAN 2 (objects 1…4) among all.
 const PLACES: [core::ops::Range<usize>; 2] = [0..2, 2..6];
@@ -95,7 +97,7 @@ pub enum ResetError {
 
 impl<S: Storage, R: AsRef<[u8]> + AsMut<[u8]>> Controller<S, R> {
     /// Switches a controller on: parameters, failures and run time come from `storage`, or are as
-    /// delivered where nothing (or nothing readable) was saved there.
+    /// delivered where nothing (or nothing readable, see [`is_damaged`]) was saved there.
     pub fn power_on(model: Model, storage: S, ram: R) -> Self {
         let working = load(&SAVED, &storage).unwrap_or_default();
         let status = Status::load(&storage).unwrap_or_default();
@@ -160,6 +162,9 @@ impl<S: Storage, R: AsRef<[u8]> + AsMut<[u8]>> Controller<S, R> {
                 failures: self.failures.clone(),
             };
             status.save(&mut self.storage)?;
+            if stored_model(&self.storage) != Some(self.model.number()) {
+                MODEL.save(&mut self.storage, &[i32::from(self.model.number())])?;
+            }
             self.since_retained = Duration::ZERO;
             self.retain = false;
         }
@@ -315,6 +320,28 @@ impl<S: Storage, R: AsRef<[u8]> + AsMut<[u8]>> Controller<S, R> {
     fn ram(&self, offset: u16, len: usize) -> Option<&[u8]> {
         self.ram.as_ref().get(usize::from(offset)..usize::from(offset) + len)
     }
+}
+
+/// Number of the model whose memory this is; `None` while none has retained anything there.
+#[must_use]
+pub fn stored_model(storage: &impl Storage) -> Option<u16> {
+    let mut words = [0];
+    let [model] = MODEL.load(storage, &mut words).ok()?.then_some(words)?;
+    u16::try_from(model).ok()
+}
+
+/// Whether a memory holds what cannot be read any more: [`Controller::power_on`] takes what was saved there
+/// before it, or what is delivered, in its place.
+///
+/// # Errors
+/// [`StorageError`] if the memory cannot be read.
+pub fn is_damaged(storage: &impl Storage) -> Result<bool, StorageError> {
+    for record in [SAVED, IMAGE, STATUS, MODEL] {
+        if record.is_damaged(storage)? {
+            return Ok(true);
+        }
+    }
+    Ok(false)
 }
 
 fn load(record: &Record, storage: &impl Storage) -> Option<Values> {

@@ -137,8 +137,7 @@ fn begin(
     let stop = stop_flag()?;
     match flash {
         Some(file) => {
-            let storage =
-                FileStorage::open(file).map_err(|error| Exit::file(&file.display().to_string(), &error))?;
+            let storage = FileStorage::of(out, file, config.model()?)?;
             control(out, config, storage, limit, &stop, recorder)
         }
         None => control(out, config, vec![0xFF; STORAGE_LEN], limit, &stop, recorder),
