@@ -331,6 +331,23 @@ fn a_step_that_fails_is_a_check_that_failed() {
     assert!(!ran.says("2 steps of the program failed").stdout().contains("aborted"));
 }
 
+/// The axis moves on to its target.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_recording_that_cannot_be_written_is_told_at_once() {
+    let bench = Bench::new();
+    let config = "[parameters]\n0 = 1\n108 = 0\n109 = 0\n601 = 0\n602 = 0\n606 = 8\n642 = 1000\n654 = 100\n\
+                  [[program]]\nat = 0.05\ndo = \"power\"\naxis = 1\n\
+                  [[program]]\nat = 0.1\ndo = \"move-absolute\"\naxis = 1\nposition = 1500\n";
+    let ran = run(&bench, config, &["--for", "3", "--record", "/dev/full"]).ends(5);
+    let ran = ran.says("note: nothing is recorded any more: /dev/full: ").says("move-absolute: done");
+    assert!(ran.stderr().contains("error: /dev/full: "), "{}", ran.stderr());
+    let ran = run(&bench, config, &["--for", "3", "--record", "/dev/full", "--json"]).ends(5);
+    let told = ran.stdout().lines().position(|line| line.contains("remarks") && line.contains("/dev/full"));
+    let done = ran.stdout().lines().position(|line| line.contains("\"move-absolute\""));
+    assert!(told.is_some() && told < done, "{}", ran.stdout());
+}
+
 /// A state is that of one model; a bit that has changed in it is told.
 #[test]
 fn a_state_that_is_damaged_or_of_another_model_is_told() {

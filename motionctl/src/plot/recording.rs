@@ -3,7 +3,7 @@
 use core::time::Duration;
 use std::io::{Read, Write};
 use std::path::Path;
-use std::sync::mpsc::{Sender, channel};
+use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 
 use motion_core::application::AxisStatus;
@@ -148,6 +148,7 @@ pub(crate) fn write(
 /// Writes a recording while it comes, on a thread of its own: a slow disk does not hold up the cycle.
 pub(crate) struct Recorder {
     samples: Sender<Sample>,
+    trouble: Receiver<String>,
     thread: JoinHandle<Result<(), Exit>>,
 }
 
@@ -165,8 +166,19 @@ impl Recorder {
             file.set_len(0).map_err(trouble)?;
         }
         let (samples, received) = channel();
-        let thread = std::thread::spawn(move || write(&name, file, received));
-        Ok(Self { samples, thread })
+        let (tell, trouble) = channel();
+        let thread = std::thread::spawn(move || {
+            write(&name, file, received).inspect_err(|exit| {
+                // Nobody listens any more when the program ends.
+                let _ = tell.send(exit.message.clone());
+            })
+        });
+        Ok(Self { samples, trouble, thread })
+    }
+
+    /// Why nothing is written any more, once.
+    pub(crate) fn poll_trouble(&self) -> Option<String> {
+        self.trouble.try_recv().ok()
     }
 
     pub(crate) fn put(&self, sample: Sample) {

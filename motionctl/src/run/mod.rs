@@ -276,6 +276,9 @@ fn control(
             failed += usize::from(ended.2.is_failure());
             report.step(now, ended);
         }
+        if let Some(trouble) = recorder.and_then(Recorder::poll_trouble) {
+            out.remark(format!("nothing is recorded any more: {trouble}"));
+        }
         report.cycle(now, &pace.jitter);
         if ending.is_none() && (stop.load(Ordering::Relaxed) || limit.is_some_and(|limit| now >= limit)) {
             program.stop();
