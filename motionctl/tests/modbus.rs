@@ -146,6 +146,27 @@ fn a_negative_velocity_is_out_of_range() {
     }
 }
 
+#[test]
+fn the_port_is_in_the_stream_and_images_without_bytes_are_noted() {
+    let directory = tempfile::tempdir().unwrap();
+    let config = directory.path().join("run.toml");
+    let run = |text: &str, json: &[&str]| {
+        std::fs::write(&config, text).unwrap();
+        let mut command = Command::new(env!("CARGO_BIN_EXE_motionctl"));
+        command.arg("run").arg(&config).args(["--for", "0.05"]).args(json).output().unwrap()
+    };
+    let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).unwrap();
+    let said = text(&run(CONFIG, &["--json"]).stdout);
+    let first: serde_json::Value = serde_json::from_str(said.lines().next().unwrap()).unwrap();
+    assert_eq!(first["event"], "modbus");
+    let address: core::net::SocketAddr = first["address"].as_str().unwrap().parse().unwrap();
+    assert_ne!(address.port(), 0);
+    let note = "every Modbus request is refused";
+    assert!(!text(&run(CONFIG, &[]).stderr).contains(note));
+    let (without, _) = CONFIG.split_once("[parameters]").unwrap();
+    assert!(text(&run(without, &[]).stderr).contains(note));
+}
+
 /// Random bytes, requests cut short, wrong lengths, connections that end in the middle: each ends its own
 /// connection at most; another client is served all the while, and the axis does not move.
 #[test]

@@ -25,6 +25,7 @@ use motion_core::parameters::get;
 use motion_core::storage::Storage;
 use motion_core::{AXES, Controller, STORAGE_LEN};
 use motion_io::port::{Role, open};
+use serde_json::json;
 
 use crate::can::stop_flag;
 use crate::exit::Exit;
@@ -182,7 +183,13 @@ fn control(
     if let Some(server) = &mut extension {
         // The sizes of the images are known before anybody knows the address.
         controller.exchange(server);
-        out.say(&format!("Modbus TCP at {}", server.address()));
+        let address = server.address().to_string();
+        out.document(json!({ "t": 0.0, "event": "modbus", "address": address }), || {
+            out.say(&format!("Modbus TCP at {address}"));
+        });
+        if [60, 61].map(|index| controller.working().at(index, 0)) == [0, 0] {
+            out.remark("[060] and [061] are 0: there are no registers, and every Modbus request is refused");
+        }
         program = program.with_remote();
     }
     let mut lines = Vec::new();
