@@ -33,7 +33,8 @@ pub enum Operation {
     },
     /// The slave in configuration stores node ID and bit rate.
     Store,
-    /// Reads the identity of the slave in configuration.
+    /// Reads the identity of the slave in configuration. It takes [`Config::answer`], so that a second slave
+    /// is noticed.
     InquireIdentity,
     /// Reads the node ID of the slave in configuration.
     InquireNodeId,
@@ -58,6 +59,8 @@ pub enum Outcome {
     TimedOut,
     /// Fastscan: slaves answered, but none confirmed the number found; up to this part.
     Unconfirmed(Part),
+    /// [`Operation::InquireIdentity`]: a second slave in configuration answered with another number here.
+    Several(Part),
     /// [`Master::cancel`].
     Cancelled,
 }
@@ -157,6 +160,7 @@ impl Master {
         }
         self.ticket = self.ticket.wrapping_add(1);
         self.operation = operation;
+        self.answered = false;
         self.identity = match operation {
             Operation::Select(identity) => identity,
             _ => Identity::default(),
@@ -204,20 +208,15 @@ impl Master {
         if frame.standard_id() != Some(cob::LSS_RESPONSE) {
             return Handled::Ignored;
         }
-        let (Some(response), State::Wait(step, _)) = (Response::from_frame(frame), self.state) else {
-            return Handled::Taken;
-        };
+        let Some(response) = Response::from_frame(frame) else { return Handled::Taken };
+        if let (Operation::InquireIdentity, Response::Identity(part, value)) = (self.operation, response) {
+            self.on_number(part, value);
+        }
+        let State::Wait(step, _) = self.state else { return Handled::Taken };
         match (self.operation, response) {
             (Operation::Select(_), Response::Selected) => self.state = State::Ended(Outcome::Done),
             (Operation::InquireNodeId, Response::NodeId(node)) => {
                 self.state = State::Ended(Outcome::NodeId(node_of(node)));
-            }
-            (Operation::InquireIdentity, Response::Identity(part, value)) if step == Step::Part(part) => {
-                self.identity.set_part(part, value);
-                self.state = match part {
-                    Part::Serial => State::Ended(Outcome::Identity(self.identity)),
-                    part => State::Send(Step::Part(part.next())),
-                };
             }
             (Operation::Fastscan, Response::Identified) => self.answered = true,
             (_, Response::Done { command, result }) => {
@@ -232,6 +231,27 @@ impl Master {
             _ => {}
         }
         Handled::Taken
+    }
+
+    /// A slave in configuration says one of its numbers, asked for now or before.
+    fn on_number(&mut self, part: Part, value: u32) {
+        let (asked, waits) = match self.state {
+            State::Send(Step::Part(next)) => (next, false),
+            State::Wait(Step::Part(asked), _) => (asked, true),
+            _ => return,
+        };
+        if part < asked || self.answered {
+            if value != self.identity.part(part) {
+                self.state = State::Ended(Outcome::Several(part));
+            }
+        } else if part == asked && waits {
+            self.identity.set_part(part, value);
+            match part {
+                // The number that tells most slaves apart: all have time to answer.
+                Part::Serial => self.answered = true,
+                part => self.state = State::Send(Step::Part(part.next())),
+            }
+        }
     }
 
     /// Ends waiting when its time is over; early calls do nothing.
@@ -249,7 +269,7 @@ impl Master {
                 }
                 bit.checked_sub(1).map_or(Step::Confirm(part), |bit| Step::Bit(part, bit))
             }
-            Step::Confirm(Part::Serial) if self.answered => {
+            Step::Confirm(Part::Serial) | Step::Part(Part::Serial) if self.answered => {
                 self.state = State::Ended(Outcome::Identity(self.identity));
                 return;
             }
@@ -386,6 +406,25 @@ mod tests {
         let rate = BitTiming::from_kbits(20).unwrap();
         assert_eq!(run(Operation::ConfigureBitTiming(rate)), Outcome::Refused(Refusal::NOT_SUPPORTED));
         assert_eq!(run(Operation::Fastscan), Outcome::TimedOut, "all have a node ID");
+    }
+
+    #[test]
+    fn a_second_slave_in_configuration_is_noticed() {
+        let mut master = Master::default();
+        for part in Part::ALL {
+            let mut other = identity(1);
+            other.set_part(part, 77);
+            let mut slaves = [identity(1), other].map(|identity| Slave::new(identity, None, &[]));
+            let mut run = |operation| run(&mut master, &mut slaves, operation).0;
+            run(Operation::SwitchGlobal(Mode::Configuration));
+            assert_eq!(run(Operation::InquireIdentity), Outcome::Several(part));
+        }
+        // An answer that comes twice is one.
+        let mut slaves = [1, 1].map(|seed| Slave::new(identity(seed), None, &[]));
+        let mut run = |operation| run(&mut master, &mut slaves, operation);
+        run(Operation::SwitchGlobal(Mode::Configuration));
+        let read = run(Operation::InquireIdentity);
+        assert_eq!(read, (Outcome::Identity(identity(1)), Config::default().answer));
     }
 
     #[test]

@@ -23,6 +23,8 @@ pub(crate) fn run(out: &Output, global: &Global, command: &Lss) -> Result<(), Ex
     match command {
         Lss::Fastscan { line } => {
             let mut session = Session::open(global, line)?;
+            // Only waiting devices take part, and none but the one found is to be in configuration then.
+            operate(&mut session, Operation::SwitchGlobal(Mode::Waiting))?;
             let mut outcome = operate(&mut session, Operation::Fastscan)?;
             // An answer that came later than its step took is a wrong bit, which nobody confirms.
             for _ in 1..SCANS {
@@ -110,12 +112,31 @@ fn with_target(
             return Err(Exit { status: 3, message: "no device with this identity answered".into() });
         }
     }
-    let mut outcome = operate(&mut session, operation)?;
+    let mut outcome = if identity.is_some() { operate } else { operate_alone }(&mut session, operation)?;
     if outcome == Outcome::TimedOut && identity.is_none() {
         operate(&mut session, Operation::SwitchGlobal(Mode::Configuration))?;
-        outcome = operate(&mut session, operation)?;
+        outcome = operate_alone(&mut session, operation)?;
+        if matches!(outcome, Outcome::Several(_)) {
+            operate(&mut session, Operation::SwitchGlobal(Mode::Waiting))?;
+            session.flush()?;
+        }
     }
     Ok((session, outcome))
+}
+
+/// Carries an operation out unless several devices are in configuration, all of which would obey.
+fn operate_alone(session: &mut Session, operation: Operation) -> Result<Outcome, Exit> {
+    let before = session.garbled();
+    match operate(session, Operation::InquireIdentity)? {
+        Outcome::TimedOut if session.garbled() != before => Err(Exit::refused(
+            "bus errors instead of an answer: more than one device may be in configuration; give --identity",
+        )),
+        // A device need not say who it is to be configured.
+        Outcome::Identity(_) | Outcome::TimedOut if operation != Operation::InquireIdentity => {
+            operate(session, operation)
+        }
+        outcome => Ok(outcome),
+    }
 }
 
 fn operate(session: &mut Session, operation: Operation) -> Result<Outcome, Exit> {
@@ -140,6 +161,10 @@ fn failed(outcome: Outcome) -> Exit {
         Outcome::Unconfirmed(part) => {
             Exit::refused(format!("devices answered, but none confirmed its number: {part:?}"))
         }
+        Outcome::Several(part) => Exit::refused(format!(
+            "more than one device answers, they differ in 1018h:{:02X}h; give --identity",
+            part as u8 + 1
+        )),
         other => Exit::trouble(format!("{other:?}")),
     }
 }

@@ -5,7 +5,7 @@ use core::time::Duration;
 use canopen_master::master::{BusStatus, Config, Event, Master};
 use canopen_master::sdo::{Options, Outcome};
 use canopen_master::{Address, NodeId};
-use motion_io::can::{BusEvent, BusState, CanPort, Driver, Engine, Event as PortEvent, open};
+use motion_io::can::{BusError, BusEvent, BusState, CanPort, Driver, Engine, Event as PortEvent, open};
 use motion_io::endpoint::CanEndpoint;
 use pdo::Frame;
 use serde_json::{Value, json};
@@ -141,6 +141,8 @@ pub(crate) struct Session {
     mode: Option<Mode>,
     /// What of the bus was told last.
     told: Option<BusEvent>,
+    /// Frames on the bus that nobody could read, so far.
+    garbled: u32,
 }
 
 /// The endpoint that `--can`, the environment or the configuration names.
@@ -191,7 +193,7 @@ impl Session {
             config.bit_rate = bit_rate;
         }
         let wire = Wire(Box::new(Master::new(config)));
-        Ok(Self { driver: Driver::new(port), wire, answer, watched: None, mode: None, told: None })
+        Ok(Self { driver: Driver::new(port), wire, answer, watched: None, mode: None, told: None, garbled: 0 })
     }
 
     pub(crate) fn now(&self) -> Duration {
@@ -229,16 +231,22 @@ impl Session {
     /// One turn, at most until `limit`; what the bus says is told to the user, who may wonder why nobody
     /// answers.
     pub(crate) fn step(&mut self, limit: Duration) -> Result<(), Exit> {
-        let mut told = self.told;
+        let (mut told, mut garbled) = (self.told, self.garbled);
         self.turn(limit, |_, event, _| {
-            if let PortEvent::Bus(event) = event
-                && told.replace(event) != Some(event)
-            {
-                eprintln!("note: {event}");
+            if let PortEvent::Bus(event) = event {
+                garbled += u32::from(event == BusEvent::Error(BusError::Protocol));
+                if told.replace(event) != Some(event) {
+                    eprintln!("note: {event}");
+                }
             }
         })?;
-        self.told = told;
+        (self.told, self.garbled) = (told, garbled);
         Ok(())
+    }
+
+    /// How many frames nobody on the bus could read, such as those of several nodes at once.
+    pub(crate) const fn garbled(&self) -> u32 {
+        self.garbled
     }
 
     /// Runs until `pick` takes an event, at most until `limit`.
