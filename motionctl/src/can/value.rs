@@ -120,11 +120,22 @@ pub(crate) fn encode(text: &str, data_type: DataType) -> Result<Vec<u8>, Exit> {
                 _ => return Err(wrong("a number of up to 64 bits")),
             }
         }
-        canopen_master::data_type::Kind::Real(4) => {
-            Value::Real32(text.parse().map_err(|_| wrong("a number"))?)
-        }
-        canopen_master::data_type::Kind::Real(_) => {
-            Value::Real64(text.parse().map_err(|_| wrong("a number"))?)
+        canopen_master::data_type::Kind::Real(bytes) => {
+            let value = match bytes {
+                4 => text.parse().map(Value::Real32),
+                _ => text.parse().map(Value::Real64),
+            };
+            let value = value.map_err(|_| wrong("a number"))?;
+            // Infinity is only written where it is asked for: inf has no digit.
+            let infinite = match value {
+                Value::Real32(value) => value.is_infinite(),
+                Value::Real64(value) => value.is_infinite(),
+                _ => false,
+            };
+            if infinite && text.contains(|letter: char| letter.is_ascii_digit()) {
+                return Err(Exit::usage(format!("{text:?}: number out of the range of {data_type}")));
+            }
+            value
         }
         canopen_master::data_type::Kind::VisibleString => return Ok(text.as_bytes().to_vec()),
         canopen_master::data_type::Kind::UnicodeString => {
@@ -168,8 +179,8 @@ pub(crate) fn decode(data: &[u8], data_type: DataType) -> Result<Json, Exit> {
         Value::Signed(value) => json!(value),
         Value::Unsigned(value) => json!(value),
         // The shortest text that reads back as the same number.
-        Value::Real32(value) => value.to_string().parse::<f64>().map_or(Json::Null, |value| json!(value)),
-        Value::Real64(value) => json!(value),
+        Value::Real32(value) => real(value.to_string().parse().unwrap_or(f64::NAN)),
+        Value::Real64(value) => real(value),
         Value::VisibleString(text) => {
             let end = text.iter().rposition(|byte| *byte != 0).map_or(0, |last| last + 1);
             json!(String::from_utf8_lossy(text.get(..end).unwrap_or(text)))
@@ -182,6 +193,11 @@ pub(crate) fn decode(data: &[u8], data_type: DataType) -> Result<Json, Exit> {
         }
         _ => json!(hex(data)),
     })
+}
+
+/// A number; JSON has none for infinity and NaN, which are texts.
+fn real(value: f64) -> Json {
+    if value.is_finite() { json!(value) } else { json!(value.to_string()) }
 }
 
 #[cfg(test)]
@@ -229,6 +245,22 @@ mod tests {
             ("0", DataType::DOMAIN),
         ] {
             assert_eq!(encode(text, data_type).unwrap_err().status, 2, "{text}");
+        }
+    }
+
+    #[test]
+    fn a_real_number_out_of_range_is_not_written_as_infinity() {
+        for (text, data_type) in
+            [("1e40", DataType::REAL32), ("-3.5e38", DataType::REAL32), ("1e400", DataType::REAL64)]
+        {
+            let error = encode(text, data_type).unwrap_err();
+            assert_eq!(error.status, 2);
+            assert!(error.message.contains("out of the range of REAL"), "{}", error.message);
+        }
+        for data_type in [DataType::REAL32, DataType::REAL64] {
+            for text in ["inf", "-inf", "NaN"] {
+                assert_eq!(decode(&encode(text, data_type).unwrap(), data_type).unwrap(), text);
+            }
         }
     }
 }
