@@ -51,6 +51,7 @@ pub const NAME: usize = 24;
 pub struct Name {
     bytes: [u8; NAME],
     len: u8,
+    cut: bool,
 }
 
 impl Name {
@@ -58,6 +59,12 @@ impl Name {
     #[must_use]
     pub fn bytes(&self) -> &[u8] {
         self.bytes.get(..usize::from(self.len)).unwrap_or(&[])
+    }
+
+    /// Whether the device gave more than is kept.
+    #[must_use]
+    pub const fn is_cut(&self) -> bool {
+        self.cut
     }
 
     /// As text up to the first byte that is no ASCII, or a zero.
@@ -113,6 +120,7 @@ impl Info {
 pub(crate) struct Head {
     bytes: [u8; NAME],
     len: u8,
+    cut: bool,
 }
 
 impl Head {
@@ -123,7 +131,7 @@ impl Head {
     }
 
     pub(crate) const fn name(&self) -> Name {
-        Name { bytes: self.bytes, len: self.len }
+        Name { bytes: self.bytes, len: self.len, cut: self.cut }
     }
 
     /// As a little-endian number; bytes that the device did not send are 0.
@@ -143,7 +151,9 @@ impl Buffer for Head {
         for (to, from) in room.iter_mut().zip(data) {
             *to = *from;
         }
-        self.len = (offset as usize).saturating_add(data.len()).min(NAME) as u8;
+        let len = (offset as usize).saturating_add(data.len());
+        self.len = len.min(NAME) as u8;
+        self.cut = len > NAME;
         Ok(())
     }
 

@@ -82,8 +82,9 @@ fn several_lss_devices_in_configuration_are_told_and_not_configured() {
     bench.sim(&["io", "--node", "255", "--serial-number", "1"]);
     bench.sim(&["io", "--node", "255", "--serial-number", "2"]);
     for command in [&["lss", "identify"][..], &["lss", "set-node", "20"], &["lss", "store"]] {
-        let (_, said) = told(&bench, command, 4);
+        let (document, said) = told(&bench, command, 4);
         assert!(said.contains("more than one device answers"), "{said}");
+        assert!(document["error"].as_str().unwrap().contains("more than one"), "{document}");
     }
     // The first one found was left in configuration beside the second one.
     bench.can(&["lss", "fastscan"], 0);
@@ -91,4 +92,30 @@ fn several_lss_devices_in_configuration_are_told_and_not_configured() {
     bench.can(&["lss", "set-node", "22"], 0);
     assert_eq!(bench.can(&["scan", "--nodes", "22"], 0)["nodes"][0]["identity"]["serial"], found["serial"]);
     assert_ne!(bench.can(&["lss", "fastscan"], 0)["serial"], found["serial"]);
+}
+
+#[test]
+fn a_name_is_shown_whole_or_marked() {
+    let bench = Bench::new();
+    let name = b"Caf\xE9 and a name that is long".as_slice();
+    let mut sent = 0;
+    let _fake = Fake::server(&bench, move |request| match (request[0] >> 5, &request[1..3]) {
+        (2, [0x00, 0x10]) => vec![0x43, 0, 0x10, 0, 0x91, 1, 0, 0],
+        (2, [0x08, 0x10]) => {
+            sent = 0;
+            vec![0x40, 0x08, 0x10, 0, 0, 0, 0, 0]
+        }
+        (3, _) => {
+            let piece = &name[sent..name.len().min(sent + 7)];
+            sent += piece.len();
+            let last = u8::from(sent == name.len());
+            let mut answer = vec![request[0] & 0x10 | (7 - piece.len() as u8) << 1 | last];
+            answer.extend(piece);
+            answer.resize(8, 0);
+            answer
+        }
+        _ => [&[0x80], &request[1..4], &[0, 0, 2, 6]].concat(),
+    });
+    let scan = bench.can(&["scan", "--nodes", "50", "--timeout", "1"], 0);
+    assert_eq!(scan["nodes"][0]["name"], "Caf\u{FFFD} and a name that is …");
 }

@@ -70,6 +70,14 @@ fn show_states(session: &mut Session, nodes: NodeSet) -> Result<(), Exit> {
     }
 }
 
+/// A device's name: what is no text is replaced, and what the scan has cut is marked.
+fn name_text(name: &scan::Name) -> String {
+    let bytes = name.bytes();
+    let end = bytes.iter().rposition(|byte| *byte != 0).map_or(0, |last| last + 1);
+    let mark = if name.is_cut() { "…" } else { "" };
+    String::from_utf8_lossy(bytes.get(..end).unwrap_or(bytes)).into_owned() + mark
+}
+
 pub(crate) fn scan(out: &Output, global: &Global, line: &CanLine, nodes: Option<&str>) -> Result<(), Exit> {
     let nodes = nodes.map_or(Ok(NodeSet::up_to(NodeId::MAX)), node_list)?;
     let mut session = Session::open(global, line)?;
@@ -95,18 +103,19 @@ pub(crate) fn scan(out: &Output, global: &Global, line: &CanLine, nodes: Option<
                 "serial": identity.serial,
             })
         });
+        let name = name_text(&info.name);
         list.push(json!({
             "node": node.raw(),
             "profile": info.profile(),
             "device_type": info.device_type,
-            "name": info.name.text(),
+            "name": name,
             "identity": identity,
             "opmode": info.opmode,
             "state": state_json(state),
         }));
         let profile = info.profile().map_or("-".into(), |profile| format!("{profile:04X}h"));
         let state = state.map_or("-".into(), |state| state.to_string());
-        rows.push(format!("{:>4}  {profile:7}  {:24}  {state}", node.raw(), info.name.text()));
+        rows.push(format!("{:>4}  {profile:7}  {name:24}  {state}", node.raw()));
     }
     out.document(json!({ "nodes": list }), || {
         println!("node  profile  name                      state");
