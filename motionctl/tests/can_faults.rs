@@ -119,3 +119,24 @@ fn a_name_is_shown_whole_or_marked() {
     let scan = bench.can(&["scan", "--nodes", "50", "--timeout", "1"], 0);
     assert_eq!(scan["nodes"][0]["name"], "Caf\u{FFFD} and a name that is …");
 }
+
+#[test]
+fn a_pdo_that_a_node_acknowledges_but_does_not_keep_is_told() {
+    let bench = Bench::new();
+    let _fake = Fake::server(&bench, |request| {
+        let at = [request[1], request[2], request[3]];
+        let value: u32 = match at {
+            [1, 0x18, 1] => 0x1B2,
+            [1, 0x18, 2] => 255,
+            [1, 0x1A, 0] => 1,
+            [1, 0x1A, 1] => 0x6000_0108,
+            _ => 0,
+        };
+        let command = if request[0] >> 5 == 2 { 0x43 } else { 0x60 };
+        [&[command], &at[..], &value.to_le_bytes()].concat()
+    });
+    let map = ["pdo", "write", "50", "tpdo2", "--map", "0x6000:2:8", "--transmission", "1"];
+    let (document, said) = told(&bench, &map, 1);
+    assert_eq!(document["differs"], json!(["transmission type", "mapping"]));
+    assert!(said.contains("did not keep: transmission type, mapping"), "{said}");
+}

@@ -47,6 +47,26 @@ pub(super) struct Setup {
 }
 
 impl Setup {
+    /// What a node that has taken this does not show when it is read back.
+    pub(super) fn differs(&self, kept: &Self) -> Vec<&'static str> {
+        // Bit 30 is the device's: whether it answers remote frames.
+        let identifier = |cob: u32| cob & 0x1FFF_FFFF;
+        [
+            (identifier(self.cob) != identifier(kept.cob), "identifier"),
+            (
+                self.cob & OFF != kept.cob & OFF,
+                if self.cob & OFF == 0 { "switched on" } else { "switched off" },
+            ),
+            (self.transmission != kept.transmission, "transmission type"),
+            (self.inhibit != kept.inhibit, "inhibit time"),
+            (self.event != kept.event, "event timer"),
+            (self.mapping != kept.mapping, "mapping"),
+        ]
+        .into_iter()
+        .filter_map(|(differs, what)| differs.then_some(what))
+        .collect()
+    }
+
     /// What is written, in the order of CiA 301, 7.5.2.38: off, count 0, entries, count, on.
     fn steps(&self, place: Place) -> Vec<(Address, Vec<u8>, String)> {
         let com = |sub| Address::new(place.communication, sub);
@@ -253,6 +273,15 @@ mod tests {
         // Only its answer was lost: what was before is put back.
         let (_, left) = changed(|number| if number == 0 { Outcome::TimedOut } else { Outcome::Done(4) });
         assert_eq!(left, Some(Left::Restored));
+    }
+
+    #[test]
+    fn what_a_node_acknowledges_and_does_not_keep_is_named() {
+        assert_eq!(wanted().differs(&wanted()), [""; 0]);
+        assert_eq!(wanted().differs(&before()), ["transmission type", "mapping"]);
+        let off = Setup { cob: 0x286 | OFF, ..wanted() };
+        assert_eq!(off.differs(&wanted()), ["identifier", "switched off"]);
+        assert_eq!(wanted().differs(&Setup { cob: 0x285 | 1 << 30, ..wanted() }), [""; 0]);
     }
 
     #[test]

@@ -132,9 +132,18 @@ pub(crate) fn run(out: &Output, global: &Global, command: &Pdo) -> Result<(), Ex
                 let exit = Exit::from(error).context(&what);
                 return Err(Exit { message: format!("{}; {left}", exit.message), ..exit });
             }
-            let document = read(&mut access, pdo, place)?;
+            let kept =
+                access.read(place.communication, 1).and_then(|cob| access.earlier(place, cob, &wanted));
+            let kept = kept.map_err(|exit| exit.context("reading back what was written"))?;
+            let mut document = read(&mut access, pdo, place)?;
+            let differs = wanted.differs(&kept);
+            if differs.is_empty() {
+                out.document(document.clone(), || print(&document));
+                return Ok(());
+            }
+            document["differs"] = json!(differs);
             out.document(document.clone(), || print(&document));
-            Ok(())
+            Err(Exit::check(format!("node {node} acknowledged but did not keep: {}", differs.join(", "))))
         }
     }
 }
