@@ -71,7 +71,14 @@ pub enum Event {
         /// The toggle that was expected.
         expected: bool,
     },
+    /// The node sends heartbeats as well, which a guarded node does not (CiA 301, 7.2.8.2.2). They are no
+    /// answers. Told once.
+    Heartbeats,
 }
+
+/// So many unasked messages that are no answers are heartbeats; one may be the answer to a request from before
+/// a boot-up.
+const HEARTBEATS: u8 = 2;
 
 /// The master's side for one node.
 #[derive(Debug, Clone, Copy)]
@@ -89,6 +96,8 @@ pub struct Guard {
     missed: bool,
     lost: bool,
     toggle_told: bool,
+    /// Messages that can only be heartbeats, so far.
+    heartbeats: u8,
 }
 
 impl Guard {
@@ -104,6 +113,7 @@ impl Guard {
             missed: false,
             lost: false,
             toggle_told: false,
+            heartbeats: 0,
         }
     }
 
@@ -148,13 +158,17 @@ impl Guard {
         toggle || self.asked && self.toggle != Some(true)
     }
 
-    /// Takes an answer.
+    /// Takes an answer, or a heartbeat.
     pub fn handle_answer(&mut self, now: Duration, byte: u8) -> Option<Event> {
         let toggle = byte & 0x80 != 0;
+        let wrong = self.toggle.filter(|expected| *expected != toggle);
+        if !toggle && self.is_heartbeat(wrong.is_some()) {
+            self.heartbeats = self.heartbeats.saturating_add(1);
+            return (self.heartbeats == HEARTBEATS).then_some(Event::Heartbeats);
+        }
         self.asked = false;
         let missed = core::mem::take(&mut self.missed);
-        if let Some(expected) = self.toggle
-            && expected != toggle
+        if let Some(expected) = wrong
             && !missed
         {
             return (!core::mem::replace(&mut self.toggle_told, true)).then_some(Event::Toggle { expected });
@@ -162,6 +176,17 @@ impl Guard {
         self.toggle = Some(!toggle);
         self.toggle_told = false;
         self.alive(now)
+    }
+
+    /// Whether a message with toggle 0 is no answer: nobody has asked, or the toggle is wrong where heartbeats
+    /// have been seen.
+    const fn is_heartbeat(&self, wrong: bool) -> bool {
+        let known = self.heartbeats >= HEARTBEATS;
+        match (self.asked, wrong) {
+            (false, true) => known || !self.missed,
+            (true, true) => known || self.heartbeats > 0 && !self.missed,
+            (asked, false) => known && !asked,
+        }
     }
 
     /// Takes a boot-up message: the next answer has toggle 0.
@@ -300,6 +325,37 @@ mod tests {
             events.extend(guard.handle_answer(ms(100 * step + 1), 0x05));
         }
         assert_eq!(events, [Event::Toggle { expected: true }, Event::Lost]);
+    }
+
+    #[test]
+    fn heartbeats_of_a_guarded_node_are_no_answers_and_told_once() {
+        // Answers first and heartbeats first.
+        for heartbeat in [20, 80] {
+            let mut guard = Guard::new(Config::default(), ms(0));
+            let mut slave = Slave::new(NODE, Some(Config::default()));
+            let mut events = std::vec::Vec::new();
+            for step in 0..20 {
+                let now = ms(100 * step);
+                if heartbeat == 80 && step > 0 {
+                    events.extend(guard.handle_answer(ms(100 * step - 20), State::Operational as u8));
+                }
+                events.extend(guard.handle_timeout(now).1);
+                let (answer, _) = slave.handle_request(now, State::Operational);
+                events.extend(guard.handle_answer(now, answer.data()[0]));
+                if heartbeat == 20 {
+                    events.extend(guard.handle_answer(ms(100 * step + 20), State::Operational as u8));
+                }
+            }
+            assert_eq!(events, [Event::Heartbeats]);
+        }
+        // A node that only sends heartbeats is lost.
+        let mut guard = Guard::new(Config::default(), ms(0));
+        let mut events = std::vec::Vec::new();
+        for step in 0..20 {
+            events.extend(guard.handle_timeout(ms(50 * step)).1);
+            events.extend(guard.handle_answer(ms(50 * step + 1), State::Operational as u8));
+        }
+        assert_eq!(events, [Event::Heartbeats, Event::Lost]);
     }
 
     #[test]

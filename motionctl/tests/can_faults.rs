@@ -140,3 +140,16 @@ fn a_pdo_that_a_node_acknowledges_but_does_not_keep_is_told() {
     assert_eq!(document["differs"], json!(["transmission type", "mapping"]));
     assert!(said.contains("did not keep: transmission type, mapping"), "{said}");
 }
+
+#[test]
+fn heartbeats_of_a_guarded_node_are_told_once() {
+    let mut bench = Bench::new();
+    bench.sim(&["io", "--node", "5"]);
+    bench.can(&["sdo", "write", "5", "0x1017", "70", "--type", "u16"], 0);
+    let output = bench.run(&["guard", "5", "--period", "0.1", "--for", "2"]);
+    assert_eq!(output.status.code(), Some(0));
+    let lines = String::from_utf8(output.stdout).unwrap();
+    let events = lines.lines().map(|line| serde_json::from_str::<Value>(line).unwrap()["event"].clone());
+    let told: Vec<Value> = events.filter(|event| event != "state").collect();
+    assert_eq!(told, ["heartbeats"], "{lines}");
+}

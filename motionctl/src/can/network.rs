@@ -250,8 +250,16 @@ pub(crate) fn guard(
         session.step(limit)?;
         while let Some(event) = session.master().poll_event() {
             let (node, event) = match event {
-                Event::Guarding { node, event: GuardEvent::Lost } => (node, "lost"),
-                Event::Guarding { node, event: GuardEvent::Back } => (node, "back"),
+                Event::Guarding { node, event: GuardEvent::Lost } => {
+                    (node, "lost")
+                }
+                Event::Guarding { node, event: GuardEvent::Back } => {
+                    (node, "back")
+                }
+                Event::Guarding { node, event: GuardEvent::Heartbeats } => {
+                    out.remark(format!("node {node} sends heartbeats (1017h); it cannot be guarded as well"));
+                    (node, "heartbeats")
+                }
                 Event::Guarding { node, event: GuardEvent::Toggle { .. } } => (node, "toggle-error"),
                 Event::State { node, .. } | Event::BootUp(node) if nodes.contains(&node) => (node, "state"),
                 _ => continue,
