@@ -65,7 +65,7 @@ fn a_network_of_drive_and_io() {
     assert_eq!(pdo["mapping"][1], json!({ "index": 0x6000, "subindex": 1, "bits": 8 }));
     assert_eq!(bench.can(&["pdo", "read", "5", "tpdo2"], 0), pdo);
 
-    let guard = bench.can(&["guard", "9", "--for", "0.5", "--period", "0.05"], 0);
+    let guard = bench.can(&["guard", "9", "--for", "0.5", "--period", "0.05"], 3);
     assert_eq!((&guard["node"], &guard["event"]), (&json!(9), &json!("lost")));
 
     // A concise DCF: two entries.

@@ -153,3 +153,21 @@ fn heartbeats_of_a_guarded_node_are_told_once() {
     let told: Vec<Value> = events.filter(|event| event != "state").collect();
     assert_eq!(told, ["heartbeats"], "{lines}");
 }
+
+/// A node that is gone for good was told as lost, with status 0.
+#[test]
+fn a_node_that_is_lost_at_the_end_of_guarding_is_a_failure() {
+    let bench = Bench::new();
+    let mut answers = 0;
+    let fake = Fake::new(&bench, move |frame| {
+        (frame.standard_id() == Some(0x700 + NODE) && frame.is_remote() && answers < 3).then(|| {
+            answers += 1;
+            Frame::standard(0x700 + NODE, [if answers % 2 == 1 { 5 } else { 0x85 }])
+        })
+    });
+    let guard = ["guard", "50", "--period", "0.05", "--for", "1"];
+    let (_, said) = told(&bench, &guard, 1);
+    assert!(said.contains("still lost: node 50"), "{said}");
+    drop(fake);
+    assert!(told(&bench, &guard, 3).1.contains("never heard: node 50"));
+}

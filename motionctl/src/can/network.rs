@@ -246,14 +246,17 @@ pub(crate) fn guard(
             .set_guarding(now, *node, Some(config))
             .map_err(|error| Exit::trouble(error.to_string()))?;
     }
+    let mut lost = NodeSet::EMPTY;
     stream(&mut session, run, |session, limit| {
         session.step(limit)?;
         while let Some(event) = session.master().poll_event() {
             let (node, event) = match event {
                 Event::Guarding { node, event: GuardEvent::Lost } => {
+                    lost.insert(node);
                     (node, "lost")
                 }
                 Event::Guarding { node, event: GuardEvent::Back } => {
+                    lost.remove(node);
                     (node, "back")
                 }
                 Event::Guarding { node, event: GuardEvent::Heartbeats } => {
@@ -274,7 +277,13 @@ pub(crate) fn guard(
             );
         }
         Ok(())
-    })
+    })?;
+    let silent: NodeSet = lost.iter().filter(|node| session.master().state(*node).is_none()).collect();
+    match (silent.is_empty(), lost.is_empty()) {
+        (false, _) => Err(Exit { status: 3, message: format!("never heard: node {silent}") }),
+        (_, false) => Err(Exit::check(format!("still lost: node {lost}"))),
+        _ => Ok(()),
+    }
 }
 
 pub(crate) fn emcy(out: &Output, global: &Global, line: &CanLine, run: &Stream) -> Result<(), Exit> {
