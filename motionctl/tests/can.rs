@@ -56,6 +56,7 @@ fn a_network_of_drive_and_io() {
     let all = bench.can(&["nmt", "start", "all"], 0);
     let operational = |node| json!({ "node": node, "state": "operational" });
     assert_eq!(all["nodes"], json!([operational(1), operational(5)]));
+    assert_eq!(all["confirmed"], json!([1, 5]));
     assert_eq!(bench.can(&["nmt", "reset-node", "5"], 0)["nodes"][0]["state"], "boot-up");
     bench.can(&["nmt", "stop", "9", "--timeout", "0.05"], 3);
 

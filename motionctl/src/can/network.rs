@@ -173,7 +173,7 @@ pub(crate) fn nmt(
         }
         _ => None,
     })?;
-    let (confirmed, missing) = outcome.unwrap_or((NodeSet::EMPTY, NodeSet::EMPTY));
+    let (mut confirmed, missing) = outcome.unwrap_or((NodeSet::EMPTY, NodeSet::EMPTY));
     if target == Target::All {
         // Nobody has been heard before: who sends no heartbeat is asked.
         let all = NodeSet::up_to(NodeId::MAX);
@@ -184,6 +184,8 @@ pub(crate) fn nmt(
                 shown.push((node, state));
             }
         }
+        let there = shown.iter().filter(|(_, state)| *state == command.leads_to());
+        there.for_each(|(node, _)| confirmed.insert(*node));
     }
     shown.sort_by_key(|(node, _)| *node);
     let states: Vec<_> =
