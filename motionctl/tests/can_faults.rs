@@ -171,3 +171,22 @@ fn a_node_that_is_lost_at_the_end_of_guarding_is_a_failure() {
     drop(fake);
     assert!(told(&bench, &guard, 3).1.contains("never heard: node 50"));
 }
+
+/// A capture was empty until the program ended well.
+#[test]
+fn a_recording_that_is_killed_has_what_came() {
+    let mut bench = Bench::new();
+    bench.sim(&["io", "--node", "5"]);
+    let (recording, _) =
+        Running::start(&["can", "record", "F.log", "--can", &bench.endpoint], bench.directory.path());
+    bench.can(&["sdo", "write", "5", "0x1017", "20", "--type", "u16"], 0);
+    let mut ear = motion_io::can::open(&bench.endpoint.parse().unwrap()).unwrap();
+    let end = ear.now() + Duration::from_secs(10);
+    let file = bench.directory.path().join("F.log");
+    let recorded = || std::fs::read_to_string(&file).unwrap().contains("705#7F");
+    while !recorded() && ear.now() < end {
+        ear.receive(Duration::from_millis(50)).unwrap();
+    }
+    assert!(recorded());
+    drop(recording);
+}

@@ -63,6 +63,14 @@ impl<W: Write> Writer<W> {
         }
     }
 
+    /// Lets out what the sink holds back, so that it outlives a program that is killed.
+    ///
+    /// # Errors
+    /// [`io::Error`] of the sink.
+    pub fn flush(&mut self) -> io::Result<()> {
+        self.out.flush()
+    }
+
     /// Writes what ends the file and gives back the sink.
     ///
     /// # Errors

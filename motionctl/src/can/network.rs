@@ -322,7 +322,7 @@ pub(crate) fn monitor(out: &Output, global: &Global, line: &CanLine, run: &Strea
     listen(&mut *port, limit, &*stop_flag()?, |now, event| {
         let t = now.as_secs_f64();
         match event {
-            PortEvent::Frame(frame) => {
+            Some(PortEvent::Frame(frame)) => {
                 let kind = tracer.handle_frame(Some(now), 0, &frame);
                 while tracer.poll_event().is_some() {}
                 let (name, node) = (kind_name(&kind), node_of(&kind));
@@ -340,7 +340,7 @@ pub(crate) fn monitor(out: &Output, global: &Global, line: &CanLine, run: &Strea
                 });
                 out.line(document, || format!("{t:10.6}  {frame}  {name}"));
             }
-            PortEvent::Bus(event) => {
+            Some(PortEvent::Bus(event)) => {
                 let text = event.to_string();
                 let document = json!({ "t": t, "kind": "error-frame", "text": text });
                 out.line(document, || format!("{t:10.6}  {text}"));

@@ -20,6 +20,9 @@ use crate::cli::Global;
 use crate::exit::Exit;
 use crate::output::Output;
 
+/// So much of a capture is lost at most when the program is killed.
+const FLUSH: Duration = Duration::from_millis(500);
+
 /// The format that a file's name asks for.
 fn format_of(path: &Path) -> Result<WriteFormat, Exit> {
     let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or("");
@@ -55,12 +58,13 @@ fn now() -> Time {
     Time::from_zero(now).whole_micros()
 }
 
-/// Listens on an open endpoint, on which nothing is sent, for `limit` or until stopped.
+/// Listens on an open endpoint, on which nothing is sent, for `limit` or until stopped. `take` is also called
+/// when nothing has come for a step.
 pub(super) fn listen(
     port: &mut dyn CanPort,
     limit: Option<Duration>,
     stop: &AtomicBool,
-    mut take: impl FnMut(Duration, Event) -> Result<(), Exit>,
+    mut take: impl FnMut(Duration, Option<Event>) -> Result<(), Exit>,
 ) -> Result<(), Exit> {
     let start = port.now();
     while !stop.load(Ordering::Relaxed) {
@@ -69,9 +73,8 @@ pub(super) fn listen(
         if left.is_zero() {
             break;
         }
-        if let Some(event) = port.receive(left.min(STEP)).map_err(|error| gone(&error))? {
-            take(port.now().saturating_sub(start), event)?;
-        }
+        let event = port.receive(left.min(STEP)).map_err(|error| gone(&error))?;
+        take(port.now().saturating_sub(start), event)?;
     }
     Ok(())
 }
@@ -98,17 +101,21 @@ pub(super) fn run(
     out.document(json!({ "event": "ready", "endpoint": text, "file": name }), || {
         println!("recording {text} to {name}");
     });
-    let mut frames = 0u64;
-    let heard = listen(&mut *port, limit, &stop, |_, event| {
+    let (mut frames, mut flushed) = (0u64, Duration::ZERO);
+    let heard = listen(&mut *port, limit, &stop, |passed, event| {
         match event {
-            Event::Frame(frame) => {
+            Some(Event::Frame(frame)) => {
                 if let Some(record) = recorded(&frame, now()) {
                     writer.write(&record, None).map_err(trouble)?;
                     frames += 1;
                 }
             }
-            Event::Bus(event) => out.remark(event.to_string()),
+            Some(Event::Bus(event)) => out.remark(event.to_string()),
             _ => {}
+        }
+        if passed.saturating_sub(flushed) >= FLUSH {
+            flushed = passed;
+            writer.flush().map_err(trouble)?;
         }
         Ok(())
     });
