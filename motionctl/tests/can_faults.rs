@@ -142,6 +142,16 @@ fn a_pdo_that_a_node_acknowledges_but_does_not_keep_is_told() {
 }
 
 #[test]
+fn an_answer_that_does_not_fit_is_shown() {
+    let bench = Bench::new();
+    let _fake =
+        Fake::server(&bench, |request| vec![0x43, request[1] ^ 1, request[2], request[3], 1, 2, 3, 4]);
+    let (document, said) = told(&bench, &["sdo", "read", "50", "0x1000", "--timeout", "0.2"], 3);
+    assert!(said.contains("what came instead does not fit: 4301100001020304"), "{said}");
+    assert_eq!(document["abort_code"], 0x0504_0000);
+}
+
+#[test]
 fn heartbeats_of_a_guarded_node_are_told_once() {
     let mut bench = Bench::new();
     bench.sim(&["io", "--node", "5"]);

@@ -11,6 +11,7 @@ use pdo::Frame;
 use serde_json::{Value, json};
 
 use super::cli::CanLine;
+use super::value::hex;
 use crate::cli::Global;
 use crate::connect::{ChoiceOf, choose};
 use crate::exit::Exit;
@@ -24,6 +25,9 @@ const PEER: Duration = Duration::from_secs(10);
 const FASTSCAN_STEP: Duration = Duration::from_millis(25);
 /// Frames that are still to go out when a command is done wait so long for room in the transmit queue.
 const FLUSH: Duration = Duration::from_millis(20);
+
+/// Command specifier of an abort (CiA 301, 7.2.4.3.17).
+const ABORT: u8 = 0x80;
 
 type AnyMaster = Master<'static, Vec<u8>, 127>;
 
@@ -99,12 +103,29 @@ pub(crate) struct TransferError {
     pub(crate) node: u8,
     pub(crate) at: Address,
     pub(crate) outcome: Outcome,
+    /// The last frame that the node sent instead of an answer that did not come.
+    pub(crate) instead: Option<Frame>,
+}
+
+impl core::fmt::Display for TransferError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match (self.outcome, self.instead) {
+            (Outcome::TimedOut, Some(frame)) => {
+                let shown = match frame.data() {
+                    [] => "a frame without data".into(),
+                    data => hex(data),
+                };
+                write!(f, "no answer in time; what came instead does not fit: {shown}")
+            }
+            (outcome, _) => outcome.fmt(f),
+        }
+    }
 }
 
 impl TransferError {
     /// What JSON says about it.
     pub(crate) fn json(&self) -> Value {
-        let mut document = json!({ "node": self.node, "index": self.at.index, "subindex": self.at.sub, "error": self.outcome.to_string() });
+        let mut document = json!({ "node": self.node, "index": self.at.index, "subindex": self.at.sub, "error": self.to_string() });
         match self.outcome {
             Outcome::Aborted(code) => {
                 document["abort_code"] = json!(code.0);
@@ -128,7 +149,7 @@ impl From<TransferError> for Exit {
             Outcome::Aborted(_) | Outcome::GaveUp(_) => 4,
             _ => 5,
         };
-        Self { status, message: format!("node {}, {}: {}", error.node, error.at, error.outcome) }
+        Self { status, message: format!("node {}, {}: {error}", error.node, error.at) }
     }
 }
 
@@ -139,6 +160,8 @@ pub(crate) struct Session {
     answer: Duration,
     watched: Option<(NodeId, bool)>,
     mode: Option<Mode>,
+    /// What the watched node has answered since the last request.
+    came: Option<Frame>,
     /// What of the bus was told last.
     told: Option<BusEvent>,
     /// Frames on the bus that nobody could read, so far.
@@ -193,7 +216,16 @@ impl Session {
             config.bit_rate = bit_rate;
         }
         let wire = Wire(Box::new(Master::new(config)));
-        Ok(Self { driver: Driver::new(port), wire, answer, watched: None, mode: None, told: None, garbled: 0 })
+        Ok(Self {
+            driver: Driver::new(port),
+            wire,
+            answer,
+            watched: None,
+            mode: None,
+            came: None,
+            told: None,
+            garbled: 0,
+        })
     }
 
     pub(crate) fn now(&self) -> Duration {
@@ -215,13 +247,17 @@ impl Session {
         limit: Duration,
         mut observe: impl FnMut(Duration, PortEvent, bool),
     ) -> Result<(), Exit> {
-        let (watched, mode) = (self.watched, &mut self.mode);
+        let (watched, mode, came) = (self.watched, &mut self.mode, &mut self.came);
         let done = self.driver.turn(&mut self.wire, limit, |now, event, sent| {
-            if let (PortEvent::Frame(frame), Some((node, is_upload))) = (&event, watched)
-                && mode.is_none()
-                && sent != is_upload
-            {
-                *mode = mode_of(frame, node, sent);
+            if let (PortEvent::Frame(frame), Some((node, is_upload))) = (&event, watched) {
+                if mode.is_none() && sent != is_upload {
+                    *mode = mode_of(frame, node, sent);
+                }
+                let base = if sent { pdo::cob::SDO_REQUEST } else { pdo::cob::SDO_RESPONSE };
+                let abort = sent && frame.data().first() == Some(&ABORT);
+                if frame.standard_id() == Some(base + u16::from(node.raw())) && !abort {
+                    *came = (!sent).then_some(*frame);
+                }
             }
             observe(now, event, sent);
         });
@@ -284,7 +320,7 @@ impl Session {
         at: Address,
         begin: impl FnOnce(&mut AnyMaster) -> Result<(), Exit>,
     ) -> Result<Result<Vec<u8>, TransferError>, Exit> {
-        self.mode = None;
+        (self.mode, self.came) = (None, None);
         begin(&mut self.wire.0)?;
         let finished = self.wait(Duration::MAX, |event| match event {
             Event::Sdo { finished, .. } => Some(finished),
@@ -295,7 +331,7 @@ impl Session {
         let Some(finished) = finished else { return Err(Exit::trouble("the transfer has no outcome")) };
         Ok(match finished.outcome {
             Outcome::Done(_) => Ok(finished.buffer),
-            outcome => Err(TransferError { node: node.raw(), at, outcome }),
+            outcome => Err(TransferError { node: node.raw(), at, outcome, instead: self.came }),
         })
     }
 

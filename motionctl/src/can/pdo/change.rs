@@ -180,7 +180,7 @@ pub(super) fn change(
         match carry_out(write, done > 0, before.steps(place))? {
             Ok(()) => Left::Restored,
             Err(_) if done == 0 => Left::Unknown,
-            Err((_, what, error)) => Left::Off(format!("{what}: {}", error.outcome)),
+            Err((_, what, error)) => Left::Off(format!("{what}: {error}")),
         }
     };
     Ok(Err(Failed { what, error, left }))
@@ -209,7 +209,7 @@ mod tests {
     }
 
     fn failed(at: Address, outcome: Outcome) -> TransferError {
-        TransferError { node: 5, at, outcome }
+        TransferError { node: 5, at, outcome, instead: None }
     }
 
     /// What is written to a node that answers as `answer` says (the number of the write, from 0), and how
