@@ -200,3 +200,67 @@ fn a_recording_that_is_killed_has_what_came() {
     assert!(recorded());
     drop(recording);
 }
+
+#[test]
+fn a_stopped_pdo_write_puts_back_what_was() {
+    let bench = Bench::new();
+    let (hang, written) = (Arc::new(AtomicBool::new(false)), Arc::new(std::sync::Mutex::new(Vec::new())));
+    let (hangs, writes) = (Arc::clone(&hang), Arc::clone(&written));
+    let _fake = Fake::server(&bench, move |request| {
+        let at = [request[1], request[2], request[3]];
+        match request[0] >> 5 {
+            2 => [&[0x43], &at[..], &[0xB2, 1, 0, 0]].concat(),
+            1 => {
+                writes.lock().unwrap().push(request);
+                // The third write hangs.
+                if writes.lock().unwrap().len() == 3 {
+                    hangs.store(true, Ordering::Relaxed);
+                    return vec![];
+                }
+                [&[0x60], &at[..], &[0; 4]].concat()
+            }
+            _ => vec![],
+        }
+    });
+    let write = ["can", "pdo", "write", "50", "tpdo2", "--transmission", "1", "--inhibit", "5"];
+    let mut child = bench.spawn(&[&write[..], &["--timeout", "20"]].concat());
+    while !hang.load(Ordering::Relaxed) {
+        std::thread::yield_now();
+    }
+    interrupt(&child);
+    assert_eq!(child.wait().unwrap().code(), Some(1));
+    let written = written.lock().unwrap();
+    assert_eq!(written.last().unwrap()[..4], [0x23, 1, 0x18, 1], "switched on again: {written:02X?}");
+}
+
+/// The next client found the server in the middle of a transfer.
+#[test]
+fn a_stopped_transfer_is_aborted() {
+    let bench = Bench::new();
+    let (begun, aborted) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
+    let (begins, aborts) = (Arc::clone(&begun), Arc::clone(&aborted));
+    let _fake = Fake::server(&bench, move |request| match request[0] >> 5 {
+        2 => vec![0x40, request[1], request[2], request[3], 0, 0, 0, 0],
+        3 => {
+            begins.store(true, Ordering::Relaxed);
+            [&[request[0] & 0x10][..], &[0x41; 7]].concat()
+        }
+        4 => {
+            aborts.store(true, Ordering::Relaxed);
+            vec![]
+        }
+        _ => vec![],
+    });
+    let mut child = bench.spawn(&["can", "sdo", "read", "50", "0x2000:1"]);
+    while !begun.load(Ordering::Relaxed) {
+        std::thread::yield_now();
+    }
+    interrupt(&child);
+    assert_eq!(child.wait().unwrap().code(), Some(1));
+    let mut ear = motion_io::can::open(&bench.endpoint.parse().unwrap()).unwrap();
+    let end = ear.now() + Duration::from_secs(5);
+    while !aborted.load(Ordering::Relaxed) && ear.now() < end {
+        ear.receive(Duration::from_millis(20)).unwrap();
+    }
+    assert!(aborted.load(Ordering::Relaxed));
+}

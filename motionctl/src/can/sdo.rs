@@ -14,6 +14,7 @@ pub(crate) fn run(out: &Output, global: &Global, command: &Sdo) -> Result<(), Ex
         Sdo::Read { object, output } => {
             let (at, data_type) = resolve(object)?;
             let mut session = Session::open(global, &object.line)?;
+            session.stop_transfers()?;
             let read = session.upload(node_id(object.node)?, at, object.block)?;
             let (data, mode) = read.map_err(|error| tell(out, error))?;
             if let Some(path) = output {
@@ -62,6 +63,7 @@ pub(crate) fn run(out: &Output, global: &Global, command: &Sdo) -> Result<(), Ex
                 return Ok(());
             }
             let mut session = Session::open(global, &object.line)?;
+            session.stop_transfers()?;
             let size = data.len();
             let shown = hex(&data);
             let written = session.download(node_id(object.node)?, at, data, object.block)?;

@@ -3,7 +3,7 @@
 use core::time::Duration;
 
 use canopen_master::master::{BusStatus, Config, Event, Master};
-use canopen_master::sdo::{Options, Outcome};
+use canopen_master::sdo::{Options, Outcome, Ticket};
 use canopen_master::{Address, NodeId};
 use motion_io::can::{BusError, BusEvent, BusState, CanPort, Driver, Engine, Event as PortEvent, open};
 use motion_io::endpoint::CanEndpoint;
@@ -11,7 +11,9 @@ use pdo::Frame;
 use serde_json::{Value, json};
 
 use super::cli::CanLine;
+use super::network::STEP;
 use super::value::hex;
+use super::{interrupted, stop_flag};
 use crate::cli::Global;
 use crate::connect::{ChoiceOf, choose};
 use crate::exit::Exit;
@@ -110,6 +112,7 @@ pub(crate) struct TransferError {
 impl core::fmt::Display for TransferError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match (self.outcome, self.instead) {
+            (Outcome::Cancelled, _) => f.write_str("stopped"),
             (Outcome::TimedOut, Some(frame)) => {
                 let shown = match frame.data() {
                     [] => "a frame without data".into(),
@@ -147,6 +150,7 @@ impl From<TransferError> for Exit {
         let status = match error.outcome {
             Outcome::TimedOut => 3,
             Outcome::Aborted(_) | Outcome::GaveUp(_) => 4,
+            Outcome::Cancelled => 1,
             _ => 5,
         };
         Self { status, message: format!("node {}, {}: {error}", error.node, error.at) }
@@ -162,6 +166,8 @@ pub(crate) struct Session {
     mode: Option<Mode>,
     /// What the watched node has answered since the last request.
     came: Option<Frame>,
+    /// A signal ends a transfer, not the program.
+    stoppable: bool,
     /// What of the bus was told last.
     told: Option<BusEvent>,
     /// Frames on the bus that nobody could read, so far.
@@ -223,6 +229,7 @@ impl Session {
             watched: None,
             mode: None,
             came: None,
+            stoppable: false,
             told: None,
             garbled: 0,
         })
@@ -314,21 +321,36 @@ impl Session {
         Ok(())
     }
 
+    /// From now on a signal ends the transfer that is under way, or the next one, and not the program: the node
+    /// is told, and what was begun can be undone.
+    pub(crate) fn stop_transfers(&mut self) -> Result<(), Exit> {
+        stop_flag()?;
+        self.stoppable = true;
+        Ok(())
+    }
+
     fn transfer(
         &mut self,
         node: NodeId,
         at: Address,
-        begin: impl FnOnce(&mut AnyMaster) -> Result<(), Exit>,
+        begin: impl FnOnce(&mut AnyMaster) -> Result<Ticket, Exit>,
     ) -> Result<Result<Vec<u8>, TransferError>, Exit> {
         (self.mode, self.came) = (None, None);
-        begin(&mut self.wire.0)?;
-        let finished = self.wait(Duration::MAX, |event| match event {
-            Event::Sdo { finished, .. } => Some(finished),
-            _ => None,
-        })?;
+        let ticket = begin(&mut self.wire.0)?;
+        let finished = loop {
+            if self.stoppable && interrupted() {
+                self.wire.0.cancel(node, ticket);
+            }
+            let finished = self.wait(self.now() + STEP, |event| match event {
+                Event::Sdo { finished, .. } => Some(finished),
+                _ => None,
+            })?;
+            if let Some(finished) = finished {
+                break finished;
+            }
+        };
         self.watched = None;
         self.flush()?;
-        let Some(finished) = finished else { return Err(Exit::trouble("the transfer has no outcome")) };
         Ok(match finished.outcome {
             Outcome::Done(_) => Ok(finished.buffer),
             outcome => Err(TransferError { node: node.raw(), at, outcome, instead: self.came }),
@@ -350,7 +372,7 @@ impl Session {
         self.watched = Some((node, true));
         let done = self.transfer(node, at, |master| {
             let begun = master.upload(node, at, Vec::new(), &options);
-            begun.map(|_| ()).map_err(|refused| Exit::trouble(refused.to_string()))
+            begun.map_err(|refused| Exit::trouble(refused.to_string()))
         })?;
         Ok(done.map(|data| (data, self.mode.unwrap_or(Mode::Segmented))))
     }
@@ -367,7 +389,7 @@ impl Session {
         self.watched = Some((node, false));
         let done = self.transfer(node, at, |master| {
             let begun = master.download(node, at, data, &options);
-            begun.map(|_| ()).map_err(|refused| Exit::trouble(refused.to_string()))
+            begun.map_err(|refused| Exit::trouble(refused.to_string()))
         })?;
         Ok(done.map(|_| self.mode.unwrap_or(Mode::Segmented)))
     }

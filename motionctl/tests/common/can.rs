@@ -65,6 +65,14 @@ impl Bench {
         self.can(&["scan", "--nodes", "1"], 0);
     }
 
+    /// Starts a command.
+    #[allow(dead_code)] // not in every test program
+    pub(crate) fn spawn(&self, arguments: &[&str]) -> Child {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_motionctl"));
+        command.args(arguments).env("MOTIONCTL_CAN", &self.endpoint).current_dir(self.directory.path());
+        command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
+    }
+
     pub(crate) fn run(&self, arguments: &[&str]) -> Output {
         Command::new(env!("CARGO_BIN_EXE_motionctl"))
             .args(["--json", "can"])

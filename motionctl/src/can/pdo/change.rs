@@ -276,6 +276,13 @@ mod tests {
     }
 
     #[test]
+    fn a_change_that_is_stopped_is_undone() {
+        let (written, left) =
+            changed(|number| if number == SECOND { Outcome::Cancelled } else { Outcome::Done(4) });
+        assert_eq!((written.len(), left), (11, Some(Left::Restored)));
+    }
+
+    #[test]
     fn what_a_node_acknowledges_and_does_not_keep_is_named() {
         assert_eq!(wanted().differs(&wanted()), [""; 0]);
         assert_eq!(wanted().differs(&before()), ["transmission type", "mapping"]);

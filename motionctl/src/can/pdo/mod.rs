@@ -108,7 +108,8 @@ pub(crate) fn run(out: &Output, global: &Global, command: &Pdo) -> Result<(), Ex
                 out.plan(&format!("would set {pdo} of node {node} up: {parts}"));
                 return Ok(());
             }
-            let session = Session::open(global, line)?;
+            let mut session = Session::open(global, line)?;
+            session.stop_transfers()?;
             let mut access = Access { out, session, node: node_id(*node)? };
             let cob = access.read(place.communication, 1)?;
             let new = id.map_or(cob, |id| cob & !0x1FFF_FFFF | id);
