@@ -264,3 +264,38 @@ fn a_stopped_transfer_is_aborted() {
     }
     assert!(aborted.load(Ordering::Relaxed));
 }
+
+#[test]
+fn a_configuration_that_fails_says_what_is_written() {
+    let mut bench = Bench::new();
+    bench.sim(&["io", "--node", "5", "--write-eds", "io.eds"]);
+    let path = |name: &str| bench.directory.path().join(name);
+    let entry = |index: u16, data: &[u8]| {
+        let mut bytes = index.to_le_bytes().to_vec();
+        bytes.push(0);
+        bytes.extend((data.len() as u32).to_le_bytes());
+        bytes.extend(data);
+        bytes
+    };
+    let concise = [vec![2, 0, 0, 0], entry(0x1017, &[0, 1]), entry(0x1000, &[1, 2, 3, 4])].concat();
+    std::fs::write(path("refused"), &concise).unwrap();
+    let (document, said) = told(&bench, &["dcf", "5", "refused"], 4);
+    assert_eq!((&document["written"], &document["total"]), (&json!(1), &json!(2)));
+    assert!(said.contains("entry 2 of 2") && said.contains("1 of 2 entries are written"), "{said}");
+    std::fs::write(path("cut"), &concise[..concise.len() - 2]).unwrap();
+    let (_, said) = told(&bench, &["dcf", "5", "cut"], 5);
+    assert!(
+        said.contains("concise DCF: entry 2 of 2 needs 4 bytes") && said.contains("2 are there"),
+        "{said}"
+    );
+    let (_, said) = told(&bench, &["dcf", "5", "io.eds"], 2);
+    assert!(said.contains("no ParameterValue in it"), "{said}");
+    // What makes one doubt that the file is meant for the node.
+    let dcf = "[DeviceInfo]\nVendorNumber=0x6A\n[DeviceComissioning]\nNodeID=9\n[1017]\nParameterName=H\n\
+               DataType=6\nAccessType=rw\nDefaultValue=0\nParameterValue=1000\n";
+    std::fs::write(path("other.dcf"), dcf).unwrap();
+    let remarks = bench.can(&["dcf", "5", "other.dcf"], 0)["remarks"].to_string();
+    for words in ["other.dcf is for node 9", "errors in other.dcf", "for vendor 0000006Ah, node 5 is of"] {
+        assert!(remarks.contains(words), "{remarks}");
+    }
+}

@@ -5,6 +5,7 @@
 //! little-endian. The entries are written to the device in this order.
 
 use alloc::collections::BTreeMap;
+use alloc::format;
 use alloc::string::String;
 use alloc::vec::Vec;
 
@@ -28,7 +29,7 @@ pub struct ConciseEntry {
 #[non_exhaustive]
 pub enum ConciseError {
     /// The bytes end inside an entry.
-    #[error("ends inside entry {entry} of {count}, at offset {offset}")]
+    #[error("{} needs {needs} bytes at offset {offset}, {left} are there", place(*entry, *count))]
     Short {
         /// Position of the entry, from 1; 0 for the count itself.
         entry: u32,
@@ -36,10 +37,18 @@ pub enum ConciseError {
         count: u32,
         /// Offset of the piece that does not fit.
         offset: usize,
+        /// Bytes of the piece.
+        needs: usize,
+        /// Bytes up to the end.
+        left: usize,
     },
     /// Bytes follow the last entry.
     #[error("{0} bytes follow the last entry")]
     Surplus(usize),
+}
+
+fn place(entry: u32, count: u32) -> String {
+    if entry == 0 { "the number of entries".into() } else { format!("entry {entry} of {count}") }
 }
 
 /// A value of a device that cannot be put into a concise DCF.
@@ -91,6 +100,8 @@ impl<'a> Rest<'a> {
             entry: self.entry,
             count: self.count,
             offset: self.offset,
+            needs: length,
+            left: self.bytes.len() - self.offset,
         })?;
         self.offset += length;
         Ok(piece)
@@ -243,7 +254,7 @@ fn take_pdo(
 mod tests {
     use super::super::read;
     use super::*;
-    use alloc::format;
+    use alloc::string::ToString;
     use alloc::vec;
 
     const DCF: &str = "[DeviceComissioning]\nNodeID=5\n[1017]\nParameterName=H\nDataType=6\nAccessType=rw\nDefaultValue=0\n\
@@ -297,10 +308,14 @@ mod tests {
 
     #[test]
     fn damage_is_named() {
-        let error = ConciseError::Short { entry: 0, count: 0, offset: 0 };
+        let error = ConciseError::Short { entry: 0, count: 0, offset: 0, needs: 4, left: 3 };
         assert_eq!(parse_concise(&[1, 0, 0]), Err(error));
         let bytes = [1, 0, 0, 0, 0x17, 0x10, 0, 0xFF, 0xFF, 0xFF, 0xFF, 1];
-        assert_eq!(parse_concise(&bytes), Err(ConciseError::Short { entry: 1, count: 1, offset: 11 }));
+        let error = ConciseError::Short { entry: 1, count: 1, offset: 11, needs: 0xFFFF_FFFF, left: 1 };
+        assert_eq!(parse_concise(&bytes), Err(error));
+        let bytes = [1, 0, 0, 0, 0x17, 0x10, 0, 5, 0, 0, 0, 1, 2];
+        let told = "entry 1 of 1 needs 5 bytes at offset 11, 2 are there";
+        assert_eq!(parse_concise(&bytes).unwrap_err().to_string(), told);
         assert_eq!(parse_concise(&[0, 0, 0, 0, 9]), Err(ConciseError::Surplus(1)));
         let unknown = vec![ConciseEntry { index: 0x2000, subindex: 0, data: vec![1] }];
         assert_eq!(read(DCF.as_bytes()).unwrap().device.apply_concise(&unknown), unknown);

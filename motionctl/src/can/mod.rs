@@ -2,6 +2,7 @@
 
 pub(crate) mod bus;
 pub(crate) mod cli;
+mod dcf;
 mod link;
 mod lss;
 mod network;
@@ -30,7 +31,7 @@ pub(crate) fn run(out: &Output, global: &Global, command: &Can) -> Result<(), Ex
         Can::Sdo { command } => sdo::run(out, global, command),
         Can::Pdo { command } => pdo::run(out, global, command),
         Can::Lss { command } => lss::run(out, global, command),
-        Can::Dcf { node, file, line } => pdo::dcf(out, global, line, *node, file),
+        Can::Dcf { node, file, line } => dcf::run(out, global, line, *node, file),
         Can::Link { command } => link::run(out, global, command),
         Can::Emcy { line, stream } => network::emcy(out, global, line, stream),
         Can::Monitor { line, stream } => network::monitor(out, global, line, stream),

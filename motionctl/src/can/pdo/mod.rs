@@ -1,10 +1,7 @@
-//! `motionctl can pdo …`, `can dcf`: how a node is set up.
+//! `motionctl can pdo …`: how a node's PDOs are set up.
 
 mod change;
 
-use std::path::Path;
-
-use canopen_master::eds::{self, ConciseEntry};
 use canopen_master::sdo::Outcome;
 use canopen_master::{Address, NodeId};
 use pdo::Payload;
@@ -12,10 +9,10 @@ use pdo::mapping::{Entry, MAX_ENTRIES};
 use serde_json::{Value, json};
 
 use self::change::{Failed, Setup, change};
-use super::cli::{CanLine, Pdo};
+use super::cli::Pdo;
 use super::sdo::tell;
 use super::session::{Session, node_id};
-use super::value::{hex, hexadecimal, number};
+use super::value::{hexadecimal, number};
 use crate::cli::Global;
 use crate::exit::Exit;
 use crate::output::Output;
@@ -213,42 +210,4 @@ fn identifier(text: &str) -> Result<u32, Exit> {
     known.ok_or_else(|| {
         Exit::usage(format!("--id {text:?}: 0x001 to 0x7FF expected, in hex as 0x181 or 181h"))
     })
-}
-
-/// `motionctl can dcf NODE FILE`.
-pub(crate) fn dcf(out: &Output, global: &Global, line: &CanLine, node: u8, file: &Path) -> Result<(), Exit> {
-    let name = file.display().to_string();
-    let bytes = crate::eds::bytes(file)?;
-    let entries = entries(&bytes, node).map_err(|error| Exit::file(&name, &error))?;
-    if global.dry_run {
-        out.plan(&format!("would write {} objects to node {node}", entries.len()));
-        return Ok(());
-    }
-    let id = node_id(node)?;
-    let mut session = Session::open(global, line)?;
-    let bar = out.progress("writing", entries.len());
-    let total = entries.len();
-    for (number, entry) in entries.into_iter().enumerate() {
-        let at = Address::new(entry.index, entry.subindex);
-        let shown = hex(&entry.data);
-        let written = session.download(id, at, entry.data, false)?;
-        written.map_err(|error| {
-            tell(out, error).context(&format!("entry {} of {total}, {shown}", number + 1))
-        })?;
-        bar.inc(1);
-    }
-    bar.finish_and_clear();
-    out.document(json!({ "node": node, "written": total }), || {
-        println!("{total} objects written to node {node}");
-    });
-    Ok(())
-}
-
-/// A concise DCF is binary; a DCF or XDC says in text which values it configures.
-fn entries(bytes: &[u8], node: u8) -> Result<Vec<ConciseEntry>, String> {
-    if let Ok(entries) = eds::parse_concise(bytes) {
-        return Ok(entries);
-    }
-    let device = eds::read(bytes).map_err(|error| error.to_string())?.device;
-    device.to_concise(Some(node)).map_err(|error| error.to_string())
 }
