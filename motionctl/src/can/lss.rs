@@ -20,6 +20,15 @@ const NO_NODE: u8 = 255;
 const SCANS: usize = 5;
 
 pub(crate) fn run(out: &Output, global: &Global, command: &Lss) -> Result<(), Exit> {
+    carry_out(out, global, command).inspect_err(|exit| {
+        // As of other services, JSON readers get what the devices did not do.
+        if matches!(exit.status, 3 | 4) {
+            out.document(json!({ "error": exit.message }), || {});
+        }
+    })
+}
+
+fn carry_out(out: &Output, global: &Global, command: &Lss) -> Result<(), Exit> {
     match command {
         Lss::Fastscan { line } => {
             let mut session = Session::open(global, line)?;
