@@ -29,7 +29,7 @@ pub(crate) struct Global {
     /// Colours in messages
     #[arg(long, global = true, value_enum, default_value_t = Color::Auto)]
     pub(crate) color: Color,
-    /// Seconds that a device has to begin its answer
+    /// Seconds that a device has to begin its answer, above 0 and below 1.8e19 [default: by protocol; CANopen 0.5, `scan` 0.05, steps of `lss fastscan` 0.025]
     #[arg(long, global = true, value_name = "SECONDS", value_parser = seconds)]
     pub(crate) timeout: Option<Duration>,
     /// File with named endpoints: `[endpoints]` with lines `name = "endpoint"`, and `port = "…"` for all commands
@@ -340,7 +340,7 @@ pub(crate) fn above_zero(seconds: f64) -> Option<Duration> {
 
 /// Seconds above 0.
 pub(crate) fn seconds(text: &str) -> Result<Duration, String> {
-    text.parse().ok().and_then(above_zero).ok_or_else(|| "seconds above 0 expected".into())
+    text.parse().ok().and_then(above_zero).ok_or_else(|| "seconds above 0 expected, below 1.8e19".into())
 }
 
 fn number(text: &str) -> Result<u32, String> {

@@ -43,7 +43,7 @@ pub(crate) fn run(out: &Output, global: &Global, line: &CanLine, node: u8, file:
     }
     bar.finish_and_clear();
     out.document(json!({ "node": node, "written": total }), || {
-        println!("{total} objects written to node {node}");
+        out.say(&format!("{total} objects written to node {node}"));
     });
     Ok(())
 }

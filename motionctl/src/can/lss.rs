@@ -73,7 +73,7 @@ fn carry_out(out: &Output, global: &Global, command: &Lss) -> Result<(), Exit> {
             // A device without node ID starts when it leaves configuration.
             operate(&mut session, Operation::SwitchGlobal(Mode::Waiting))?;
             session.flush()?;
-            out.document(json!({ "set_node": node }), || println!("node ID {node} set"));
+            out.document(json!({ "set_node": node }), || out.say(&format!("node ID {node} set")));
             Ok(())
         }
         Lss::SetBitTiming { kbits, target } => {
@@ -87,7 +87,7 @@ fn carry_out(out: &Output, global: &Global, command: &Lss) -> Result<(), Exit> {
             let (_, outcome) = with_target(global, target, Operation::ConfigureBitTiming(rate))?;
             done(outcome)?;
             let text = "set; `store` keeps it, the device uses it after its next start";
-            out.document(json!({ "set_bit_timing": kbits }), || println!("{kbits} kbit/s {text}"));
+            out.document(json!({ "set_bit_timing": kbits }), || out.say(&format!("{kbits} kbit/s {text}")));
             Ok(())
         }
         Lss::Store { target } => {
@@ -99,7 +99,7 @@ fn carry_out(out: &Output, global: &Global, command: &Lss) -> Result<(), Exit> {
             done(outcome)?;
             operate(&mut session, Operation::SwitchGlobal(Mode::Waiting))?;
             session.flush()?;
-            out.document(json!({ "stored": true }), || println!("stored"));
+            out.document(json!({ "stored": true }), || out.say("stored"));
             Ok(())
         }
     }

@@ -78,7 +78,7 @@ pub(crate) fn run(out: &Output, global: &Global, command: &Sdo) -> Result<(), Ex
             });
             out.document(document, || {
                 let bytes = counted(size, "byte", "bytes");
-                println!("{bytes} written to {at} of node {}", object.node);
+                out.say(&format!("{bytes} written to {at} of node {}", object.node));
             });
             Ok(())
         }
