@@ -144,11 +144,19 @@ fn a_pdo_that_a_node_acknowledges_but_does_not_keep_is_told() {
 #[test]
 fn an_answer_that_does_not_fit_is_shown() {
     let bench = Bench::new();
-    let _fake =
-        Fake::server(&bench, |request| vec![0x43, request[1] ^ 1, request[2], request[3], 1, 2, 3, 4]);
-    let (document, said) = told(&bench, &["sdo", "read", "50", "0x1000", "--timeout", "0.2"], 3);
-    assert!(said.contains("what came instead does not fit: 4301100001020304"), "{said}");
-    assert_eq!(document["abort_code"], 0x0504_0000);
+    // Another object's, too short, and with an unknown command specifier.
+    for (came, shown) in [
+        (&[0x43, 1, 0x10, 0, 1, 2, 3, 4][..], "4301100001020304"),
+        (&[0x43, 0, 0x10], "430010"),
+        (&[0xE0, 0, 0x10, 0, 0, 0, 0, 0], "E000100000000000"),
+    ] {
+        let fake = Fake::server(&bench, move |_| came.to_vec());
+        let output = bench.run(&["sdo", "read", "50", "0x1000", "--timeout", "0.2"]);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(3), "{said}");
+        assert!(said.contains(&format!("what came instead does not fit: {shown}")), "{said}");
+        drop(fake);
+    }
 }
 
 #[test]
