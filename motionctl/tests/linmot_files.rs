@@ -231,3 +231,28 @@ fn a_reader_that_leaves_is_no_trouble() {
     let get = ["linmot", "params", "get", "13A2h", "--can", "slcan:LINE"];
     bench.run(&get).ends(0).says("ROM 77");
 }
+
+/// What `pvl check` warns of is said before anything is written, too.
+#[test]
+fn warnings_of_a_file_are_said_before_it_is_restored() {
+    let bench = Bench::new();
+    let _drive = drive(&bench, "--can=slcan-pty:LINE");
+    let linmot = Linmot { bench: &bench, carrier: &["--can", "slcan:LINE"] };
+    std::fs::write(bench.path("C.csv"), CURVE).unwrap();
+    linmot.run(&["curve", "add", "7", "C.csv"]).ends(0);
+    linmot.run(&["pvl", "backup", "B.pvl"]).ends(0);
+    common::edit(&bench.path("B.pvl"), "@CurveID 7", "@CurveID 71");
+    let words = "CurveID is 71, the info block says 7";
+    bench.run(&["linmot", "pvl", "check", "B.pvl"]).ends(0).says(words);
+    for arguments in [
+        &["pvl", "compare", "B.pvl"][..],
+        &["--dry-run", "pvl", "restore", "B.pvl"],
+        &["--yes", "pvl", "restore", "B.pvl"],
+    ] {
+        let ran = linmot.run(arguments).ends(0).says("note: B.pvl:").says(words);
+        assert!(ran.stderr().contains(words));
+        assert!(linmot.json(arguments)["remarks"][0].as_str().unwrap().ends_with(words));
+    }
+    let asked = linmot.run(&["pvl", "restore", "B.pvl"]).ends(2);
+    assert!(asked.stderr().find(words) < asked.stderr().find("--yes"), "{}", asked.stderr());
+}

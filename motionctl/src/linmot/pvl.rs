@@ -50,12 +50,16 @@ fn open(path: &Path) -> Result<BufReader<File>, Exit> {
 }
 
 /// A file without errors, from its beginning: what it alone can tell is told before a drive is needed.
-fn checked(path: &Path) -> Result<BufReader<File>, Exit> {
+fn checked(out: &Output, path: &Path) -> Result<BufReader<File>, Exit> {
     let mut file = open(path)?;
-    Summary::of(&mut file)
-        .map_err(TransferError::File)
-        .and_then(|summary| summary.check())
-        .map_err(|error| failed(path, error))?;
+    let summary = Summary::of(&mut file).map_err(|error| failed(path, TransferError::File(error)))?;
+    summary.check().map_err(|error| failed(path, error))?;
+    for (line, _, warning) in &summary.diagnostics {
+        out.remark(format!("{}:{line}: {warning}", path.display()));
+    }
+    if summary.more_diagnostics > 0 {
+        out.remark(format!("{}: {} more warnings", path.display(), summary.more_diagnostics));
+    }
     std::io::Seek::rewind(&mut file).map_err(|error| Exit::file(&path.display().to_string(), &error))?;
     Ok(file)
 }
@@ -108,7 +112,7 @@ fn restore(
     path: &Path,
     delete_curves: bool,
 ) -> Result<(), Exit> {
-    let mut file = checked(path)?;
+    let mut file = checked(out, path)?;
     let options = Options { delete_curves, dry_run: global.dry_run };
     if !global.dry_run {
         out.confirm(global.yes, "Stop the MC software and write parameters and curves to ROM and flash?")?;
@@ -154,7 +158,7 @@ fn restore(
 }
 
 fn compare(out: &Output, global: &Global, drive: &Drive, path: &Path) -> Result<(), Exit> {
-    let mut file = checked(path)?;
+    let mut file = checked(out, path)?;
     let mut link = connect(global, drive)?;
     let mut differences = Vec::new();
     let bar = out.progress("comparing", 0);
