@@ -367,6 +367,8 @@ fn wrong_usage_is_named() {
     // The endpoint as it was written, not the part of it that failed.
     with(&["--can", "slcan:NONE"]).ends(5).says("error: slcan:NONE").says("no such port");
     run(&["sim", "linmot"]).ends(2).says("--can EP or --serial EP expected");
+    let many = ["sim", "linmot", "--can", "slcan-pty:LINE", "--parameters", "20000"];
+    run(&many).ends(2).says("--parameters 20000: up to 8229 expected");
     run(&["sim", "linmot", "--can", "slcan-pty:none/X"])
         .ends(5)
         .says("error: slcan-pty:none/X: the directory of the link does not exist");

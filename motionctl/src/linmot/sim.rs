@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use device_sim::linmot::{CanDrive, Times, VirtualDrive, generated};
 use linmot::drive::LoggedError;
 use linmot::linrs::Slave;
+use linmot::upid::Usage;
 use motion_io::can::Driver;
 use motion_io::endpoint::{CanEndpoint, Endpoint, EndpointError};
 use motion_io::linmot::serve_linrs;
@@ -30,11 +31,16 @@ pub(crate) fn run(out: &Output, global: &Global, arguments: &SimLinmot) -> Resul
     if arguments.can.is_none() && arguments.serial.is_none() {
         return Err(Exit::usage("where the drive shall be: --can EP or --serial EP expected"));
     }
+    let tree = generated(arguments.parameters);
+    let writable = tree.iter().filter(|parameter| parameter.usage.contains(Usage::ROM_WRITE)).count();
+    if writable < arguments.parameters {
+        return Err(Exit::usage(format!("--parameters {}: up to {writable} expected", arguments.parameters)));
+    }
     let places = || [&arguments.can, &arguments.serial].into_iter().flatten().cloned().collect::<Vec<_>>();
     if out.only_plans(|| format!("would be a LinMot drive {} on {}", arguments.node, places().join(", "))) {
         return Ok(());
     }
-    let mut drive = VirtualDrive::new(generated(arguments.parameters), Times::default());
+    let mut drive = VirtualDrive::new(tree, Times::default());
     // What a drive without motor data has logged by the time it is first used.
     drive.log_error(LoggedError { code: 0x01, hours: 0, milliseconds: 120 });
     drive.log_error(LoggedError { code: 0x64, hours: 920, milliseconds: 10_433 });
