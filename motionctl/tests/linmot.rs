@@ -232,7 +232,7 @@ fn a_value_is_written_whole_or_not_at_all() {
         linmot.run(&["params", "list", "--changed"]).ends(0).says("3001h  ROM -100 (0000009Ch)");
         // Characters that 8 bits have.
         linmot.run(&["params", "set", "03F2h", "--", "Achse für 1 €"]).ends(0).says("Achse für 1 €");
-        linmot.run(&["params", "set", "03F2h", "--", ""]).ends(0).says("03F2h  \"\"");
+        linmot.run(&["params", "set", "03F2h", "--", ""]).ends(0).says("03F2h  ROM \"\"  RAM ");
     }
 }
 
@@ -248,6 +248,28 @@ fn a_drive_on_can_waits_for_its_node_id_and_is_guarded() {
     run(&["can", "sdo", "read", "5", "0x1008", "--type", "string"]).ends(0).says("Virtual LinMot drive");
     run(&["can", "guard", "5", "--for", "0.3"]).ends(0).says("pre-operational");
     run(&["linmot", "params", "get", "13A2h", "--node", "5"]).ends(0).says("default 10");
+}
+
+/// A string is held by its stringlets: what may be done with them may be done with it, and each memory has its own.
+#[test]
+fn a_string_has_an_access_and_two_memories() {
+    let bench = Bench::new();
+    let _drive = drive(&bench, "--can=slcan-pty:LINE");
+    let linmot = Linmot { bench: &bench, carrier: &["--can", "slcan:LINE"] };
+    linmot.run(&["params", "set", "03E8h", "--", "New"]).ends(0);
+    let get = ["params", "get", "03E8h"];
+    let with = |memory| linmot.run(&[&get[..], &[memory]].concat()).ends(0).stdout();
+    let access = "RAM read, ROM read, ROM write\n";
+    assert_eq!(with("--both"), format!("03E8h  ROM \"New\"  RAM \"MyController\"  {access}"));
+    assert_eq!(with("--ram"), format!("03E8h  RAM \"MyController\"  {access}"));
+    assert_eq!(with("--rom"), format!("03E8h  ROM \"New\"  {access}"));
+    let json = &linmot.json(&get)["parameters"][0];
+    let fields = ["text", "rom", "ram", "access"].map(|key| json[key].as_str().unwrap());
+    assert_eq!(fields, ["New", "New", "MyController", access.trim()]);
+    assert_eq!((json["usage"].as_u64(), json["live"].as_bool()), (Some(0x000D), Some(false)));
+    // What was not asked for is not shown.
+    let rom = linmot.run(&["params", "get", "13A2h", "--rom"]).ends(0);
+    assert!(rom.stdout().starts_with("13A2h  ROM 10 (0000000Ah)  RAM read, "), "{}", rom.stdout());
 }
 
 /// A drive that is away already is waited for too, and the restart that was asked for comes after.

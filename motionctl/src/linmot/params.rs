@@ -21,17 +21,38 @@ const TEXT: usize = 32;
 /// A parameter with what could be read of it.
 struct Shown {
     upid: Upid,
+    /// Of a string that of its stringlets.
     usage: Usage,
-    rom: Option<u32>,
-    ram: Option<u32>,
-    text: Option<String>,
+    rom: Option<Held>,
+    ram: Option<Held>,
     /// By which the raw values are numbers; read where it matters.
     range: Option<Range>,
+}
+
+/// What a memory holds.
+enum Held {
+    Raw(u32),
+    Text(String),
 }
 
 impl Shown {
     fn number(&self, raw: u32) -> Number {
         self.range.map_or(Number::Integer(raw.into()), |range| range.number(raw))
+    }
+
+    fn json(&self, held: Option<&Held>) -> Json {
+        match held {
+            Some(Held::Raw(raw)) => of_number(self.number(*raw)),
+            Some(Held::Text(text)) => json!(text),
+            None => Json::Null,
+        }
+    }
+
+    fn words(&self, held: &Held) -> String {
+        match held {
+            Held::Raw(raw) => format!("{} ({raw:08X}h)", self.number(*raw)),
+            Held::Text(text) => format!("{text:?}"),
+        }
     }
 }
 
@@ -62,22 +83,29 @@ fn usage(link: &mut AnyLink, upid: Upid) -> Result<Usage, Exit> {
 }
 
 fn read(link: &mut AnyLink, upid: Upid, usage: Usage, memory: cli::Memory) -> Result<Shown, Exit> {
-    let mut shown = Shown { upid, usage, rom: None, ram: None, text: None, range: None };
-    if usage.is_opaque() {
+    let mut shown = Shown { upid, usage, rom: None, ram: None, range: None };
+    if usage.is_opaque()
+        && let Some(first) = upid.stringlet(0)
+    {
+        shown.usage = self::usage(link, first)?;
+    }
+    let mut held = |value| -> Result<Held, Exit> {
+        if !usage.is_opaque() {
+            return Ok(Held::Raw(link.read(upid, value)?));
+        }
         let mut bytes = [0; TEXT];
-        let value = if memory.ram { Value::Ram } else { Value::Rom };
         let len = link.read_text(upid, value, &mut bytes)?;
-        shown.text = Some(text(bytes.get(..len).unwrap_or(&[])));
-        return Ok(shown);
-    }
+        Ok(Held::Text(text(bytes.get(..len).unwrap_or(&[]))))
+    };
     // What was asked for by name must be readable; otherwise whatever is.
-    if memory.rom || !memory.ram && usage.contains(Usage::ROM_READ) {
-        shown.rom = Some(link.read(upid, Value::Rom)?);
+    if memory.rom || !memory.ram && shown.usage.contains(Usage::ROM_READ) {
+        shown.rom = Some(held(Value::Rom)?);
     }
-    if memory.ram || !memory.rom && usage.contains(Usage::RAM_READ) {
-        shown.ram = Some(link.read(upid, Value::Ram)?);
+    if memory.ram || !memory.rom && shown.usage.contains(Usage::RAM_READ) {
+        shown.ram = Some(held(Value::Ram)?);
     }
-    if [shown.rom, shown.ram].into_iter().flatten().any(needs_range) {
+    let unclear = |held: &Held| matches!(held, Held::Raw(raw) if needs_range(*raw));
+    if [&shown.rom, &shown.ram].into_iter().flatten().any(unclear) {
         shown.range = Some(link.range(upid)?);
     }
     Ok(shown)
@@ -132,32 +160,30 @@ pub(super) fn of_number(number: Number) -> Json {
 }
 
 fn to_json(shown: &Shown) -> Json {
-    let number = |value: Option<u32>| value.map(|raw| of_number(shown.number(raw)));
+    let [rom, ram] = [&shown.rom, &shown.ram].map(|held| shown.json(held.as_ref()));
     let mut json = json!({
         "upid": shown.upid.0,
         "hex": shown.upid.to_string(),
         "layer": shown.upid.layer().map(Layer::name),
-        "ram": number(shown.ram),
-        "rom": number(shown.rom),
+        "ram": ram,
+        "rom": rom,
         "usage": shown.usage.0,
         "access": shown.usage.to_string(),
         "live": shown.usage.contains(Usage::LIVE),
     });
-    if let (Some(text), Some(json)) = (&shown.text, json.as_object_mut()) {
+    if let (Some(Held::Text(text)), Some(json)) =
+        (shown.rom.as_ref().or(shown.ram.as_ref()), json.as_object_mut())
+    {
         json.insert("text".into(), json!(text));
     }
     json
 }
 
 fn print(shown: &Shown) {
-    let value =
-        |value: Option<u32>| value.map_or("-".into(), |raw| format!("{} ({raw:08X}h)", shown.number(raw)));
-    match &shown.text {
-        Some(text) => println!("{}  {text:?}", shown.upid),
-        None => {
-            println!("{}  ROM {}  RAM {}  {}", shown.upid, value(shown.rom), value(shown.ram), shown.usage);
-        }
-    }
+    let held = [("ROM", &shown.rom), ("RAM", &shown.ram)]
+        .into_iter()
+        .filter_map(|(name, held)| held.as_ref().map(|held| format!("{name} {}  ", shown.words(held))));
+    println!("{}  {}{}", shown.upid, held.collect::<String>(), shown.usage);
 }
 
 fn get(
@@ -173,7 +199,7 @@ fn get(
     numeric(upid, usage, kind)?;
     let mut shown = read(&mut link, upid, usage, memory)?;
     let mut default = None;
-    if shown.text.is_none() {
+    if !usage.is_opaque() {
         shown.range = Some(typed(link.range(upid)?, kind));
         default = Some(link.read(upid, Value::Default)?);
     }
