@@ -272,6 +272,28 @@ fn a_string_has_an_access_and_two_memories() {
     assert!(rom.stdout().starts_with("13A2h  ROM 10 (0000000Ah)  RAM read, "), "{}", rom.stdout());
 }
 
+/// UPID 2080h says what the frames have, and what they will have after the next restart.
+#[test]
+fn the_checksum_of_linrs_is_a_parameter() {
+    let bench = Bench::new();
+    let linmot = |checksum| {
+        let carrier = ["--port", "LINE", "--timeout", "0.5", "--checksum", checksum];
+        let bench = &bench;
+        move |arguments: &[&str]| Linmot { bench, carrier: &carrier }.run(arguments)
+    };
+    let sim = ["sim", "linmot", "--serial=pty:LINE", "--state", "FLASH"];
+    let drive = bench.device(&[&sim[..], &["--checksum", "crc"]].concat());
+    linmot("crc")(&["params", "get", "2080h"]).ends(0).says("2080h  ROM 2 (00000002h)  RAM 2");
+    linmot("none")(&["params", "get", "2080h"]).ends(3);
+    linmot("crc")(&["params", "set", "2080h", "--", "1"]).ends(0).says("ROM 1 (00000001h)  RAM 2");
+    linmot("crc")(&["restart"]).ends(0);
+    linmot("sum")(&["restart", "--wait"]).ends(0);
+    linmot("sum")(&["params", "get", "2080h"]).ends(0).says("RAM 1");
+    drive.kill();
+    let _drive = bench.device(&sim);
+    linmot("sum")(&["params", "get", "2080h"]).ends(0).says("RAM 1");
+}
+
 /// A drive that is away already is waited for too, and the restart that was asked for comes after.
 #[test]
 fn a_restart_is_waited_for_while_another_goes_on() {

@@ -3,6 +3,8 @@
 
 use crc::{CRC_16_KERMIT, Crc, Table};
 
+use crate::upid::Upid;
+
 /// Most bytes of data: a length of 63 less 02h and the two IDs.
 pub const MAX_DATA: usize = 60;
 /// Most bytes of a frame: head, length, checksum, end.
@@ -30,6 +32,21 @@ pub enum Checksum {
 }
 
 impl Checksum {
+    /// The parameter that says which one a drive uses.
+    pub const UPID: Upid = Upid(0x2080);
+
+    /// As a value of [`UPID`](Self::UPID); the numbers are project-defined.
+    #[must_use]
+    pub const fn raw(self) -> u32 {
+        self as u32
+    }
+
+    /// What a value of [`UPID`](Self::UPID) says; `None` above 2.
+    #[must_use]
+    pub fn from_raw(raw: u32) -> Option<Self> {
+        [Self::None, Self::Sum, Self::Crc].into_iter().find(|checksum| checksum.raw() == raw)
+    }
+
     const fn len(self) -> usize {
         match self {
             Self::None => 0,

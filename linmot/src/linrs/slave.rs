@@ -33,7 +33,7 @@ pub struct Slave {
 }
 
 impl Slave {
-    /// The drive with this ID.
+    /// The drive with this ID. After each of its restarts the checksum is what its parameter says.
     #[must_use]
     pub const fn new(id: u8, checksum: Checksum) -> Self {
         Self {
@@ -47,6 +47,12 @@ impl Slave {
             tx_len: 0,
             away: false,
         }
+    }
+
+    /// The checksum that the drive's UPID 2080h says; `None` if it has none.
+    pub fn checksum(drive: &impl Drive) -> Option<Checksum> {
+        drive.parameter(Checksum::UPID)?;
+        Checksum::from_raw(drive.ram(Checksum::UPID))
     }
 
     /// Takes received bytes in any chunking.
@@ -77,7 +83,7 @@ impl Slave {
         if drive.is_restarting(now) {
             self.away = true;
         } else if core::mem::take(&mut self.away) {
-            *self = Self::new(self.id, self.checksum);
+            *self = Self::new(self.id, Self::checksum(drive).unwrap_or(self.checksum));
         }
         if let Some((request, reply)) = self.running
             && !drive.is_busy(now)

@@ -473,9 +473,9 @@ pub(crate) struct SimLinmot {
     /// Writable parameters that the drive has at least
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(crate) parameters: usize,
-    /// Checksum of LinRS frames
-    #[arg(long, value_enum, default_value_t = SumKind::None)]
-    pub(crate) checksum: SumKind,
+    /// Checksum of LinRS frames, written to UPID 2080h; without, what that says, as delivered none
+    #[arg(long, value_enum, conflicts_with = "can")]
+    pub(crate) checksum: Option<SumKind>,
 }
 
 /// The digits of a number that is written in hex, as 0x10 or 10h.

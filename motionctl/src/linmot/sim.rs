@@ -7,8 +7,8 @@ use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
 use device_sim::linmot::{CanDrive, Times, VirtualDrive, generated};
-use linmot::drive::LoggedError;
-use linmot::linrs::Slave;
+use linmot::drive::{Drive as _, LoggedError};
+use linmot::linrs::{Checksum, Slave};
 use linmot::upid::Usage;
 use motion_io::can::Driver;
 use motion_io::endpoint::{CanEndpoint, Endpoint, EndpointError};
@@ -74,7 +74,11 @@ pub(crate) fn run(out: &Output, global: &Global, arguments: &SimLinmot) -> Resul
     let serial = &choose(global, arguments.serial.as_deref(), ChoiceOf::Port)?;
     let endpoint: Endpoint = serial.parse().map_err(usage)?;
     let mut port = open(&endpoint, Role::Device).map_err(|error| Exit::trouble(error.to_string()))?;
-    let mut slave = Slave::new(arguments.node, checksum(arguments.checksum));
+    if let Some(sum) = arguments.checksum.map(checksum) {
+        drive.set_rom(Checksum::UPID, sum.raw());
+        drive.set_ram(Checksum::UPID, sum.raw());
+    }
+    let mut slave = Slave::new(arguments.node, Slave::checksum(&drive).unwrap_or_default());
     ready(serial);
     serve_linrs(port.as_mut(), &mut slave, &mut drive, &stop, |drive, _| keep(drive))
         .map_err(|error| Exit::file(serial, &error))
