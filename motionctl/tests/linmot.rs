@@ -110,6 +110,13 @@ fn refusals_are_named() {
             .says(": 9 setpoints in the file, 10 setpoints in the drive's curve");
         linmot.run(&["curve", "add", "101", "C.csv"]).ends(2).says("1 to 100 expected");
         linmot.run(&["table", "get", "9"]).ends(4).says("no such entry");
+        // D4h has a meaning for each kind of command.
+        let delete = linmot.run(&["table", "delete", "200"]).ends(4);
+        assert_eq!(
+            delete.stderr(),
+            "error: entry 200: command table: delete entry: the drive answered D4h, invalid entry number: no \
+             such entry\n"
+        );
         linmot.run(&["table", "set", "9", "--raw", "00"]).ends(2).says("64 expected");
         let swapped = entry(10, "x").replacen("01A7", "A701", 1);
         linmot

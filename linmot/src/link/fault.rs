@@ -1,8 +1,9 @@
 //! Why a procedure ended early.
 
+use crate::code::Status;
 use crate::curve::CurveError;
 use crate::range::{Number, Range};
-use crate::request::{Reply, Request, Value};
+use crate::request::{Access, Reply, Request, Value};
 use crate::upid::Upid;
 
 /// Why a procedure ended early.
@@ -13,7 +14,7 @@ pub enum Fault<E> {
     #[error(transparent)]
     Carrier(E),
     /// The drive refused a command.
-    #[error("{}: the drive answered {:02X}h, {}", subject(.request), .reply.status.0, .reply.status)]
+    #[error("{}: the drive answered {:02X}h, {}", subject(.request), .reply.status.0, meaning(.request, .reply.status))]
     Refused {
         /// What was asked.
         request: Request,
@@ -118,6 +119,28 @@ fn subject(request: &Request) -> impl core::fmt::Display {
         }
     }
     Subject(*request)
+}
+
+/// What a status means for this request: one of several texts of D4h.
+fn meaning(request: &Request, status: Status) -> impl core::fmt::Display {
+    struct Meaning(Status, Option<&'static str>);
+    impl core::fmt::Display for Meaning {
+        fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+            match self.1 {
+                Some(text) => f.write_str(text),
+                None => self.0.fmt(f),
+            }
+        }
+    }
+    let text = match request {
+        Request::StartCurve { access: Access::Add, .. } => Some("curve already defined"),
+        Request::StartCurve { .. } => Some("curve not present"),
+        Request::DeleteEntry { .. } | Request::GetEntry { .. } | Request::WriteEntry { .. } => {
+            Some("invalid entry number")
+        }
+        _ => None,
+    };
+    Meaning(status, text.filter(|_| status == Status::DEFINED))
 }
 
 const fn memory_name(value: Value) -> &'static str {
