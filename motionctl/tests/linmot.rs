@@ -89,7 +89,12 @@ fn refusals_are_named() {
         let drive = drive(&bench, endpoint);
         let linmot = Linmot { bench: &bench, carrier };
         linmot.run(&["params", "get", "1111h"]).ends(4).says("UPID error");
-        linmot.run(&["params", "set", "2136h", "--rom", "--", "1"]).ends(4).says("address usage error");
+        linmot.run(&["params", "set", "2136h", "--rom", "--", "1"]).ends(4).says(
+            "address usage error: its ROM value cannot be written; what can be done with it: RAM read, not in hash",
+        );
+        linmot.run(&["params", "set", "119Eh", "--both", "--", "1"]).ends(4).says(
+            "its RAM or its ROM value cannot be written; what can be done with it: RAM read, ROM read, ROM write",
+        );
         linmot.run(&["params", "set", "119Eh", "--ram", "--", "1"]).ends(4).says("not live");
         linmot
             .run(&["params", "set", "119Eh", "--", "32001"])

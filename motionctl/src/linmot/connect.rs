@@ -140,7 +140,10 @@ fn hint(request: &Request, status: Status) -> &'static str {
         (Status::USAGE, Request::Write { memory: linmot::request::Memory::Ram, .. }) => {
             ": read-only, or not live, so that only its ROM value can be written"
         }
-        (Status::USAGE, Request::Write { .. }) => ": read-only, or its RAM value cannot be written",
+        (Status::USAGE, Request::Write { memory: linmot::request::Memory::Rom, .. }) => {
+            ": its ROM value cannot be written"
+        }
+        (Status::USAGE, Request::Write { .. }) => ": its RAM or its ROM value cannot be written",
         (Status::RANGE, Request::Write { .. }) => ": below the minimum or above the maximum",
         (Status::TYPE, _) => ": a string, read and written by its stringlets",
         (Status::DEFINED, Request::StartCurve { access: linmot::request::Access::Add, .. }) => {

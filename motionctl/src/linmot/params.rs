@@ -279,7 +279,14 @@ fn set(
                 .map_err(|fault| half_written(&mut link, upid, memory, fault))?;
         }
         Wanted::Number(value, range) => {
-            link.ask(Request::Write { memory, upid, value })?;
+            link.ask(Request::Write { memory, upid, value }).map_err(|fault| {
+                let access = matches!(fault, Fault::Refused { reply, .. } if reply.status == Status::USAGE);
+                let mut exit = Exit::from(fault);
+                if access {
+                    exit.message += &format!("; what can be done with it: {usage}");
+                }
+                exit
+            })?;
             link.verify(upid, memory, value, &range).map_err(|fault| match fault {
                 Fault::ReadBack { .. } => Exit::check(fault.to_string()),
                 other => Exit::from(other).context("it was written, but could not be read back"),
