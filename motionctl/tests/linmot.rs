@@ -296,7 +296,9 @@ fn the_checksum_of_linrs_is_a_parameter() {
     let sim = ["sim", "linmot", "--serial=pty:LINE", "--state", "FLASH"];
     let drive = bench.device(&[&sim[..], &["--checksum", "crc"]].concat());
     linmot("crc")(&["params", "get", "2080h"]).ends(0).says("2080h  ROM 2 (00000002h)  RAM 2");
-    linmot("none")(&["params", "get", "2080h"]).ends(3);
+    linmot("none")(&["params", "get", "2080h"]).ends(3).says(
+        "has another ID, baud rate or checksum; --node, baud=… of the endpoint and --checksum are to be",
+    );
     linmot("crc")(&["params", "set", "2080h", "--", "1"]).ends(0).says("ROM 1 (00000001h)  RAM 2");
     linmot("crc")(&["restart"]).ends(0);
     linmot("sum")(&["restart", "--wait"]).ends(0);

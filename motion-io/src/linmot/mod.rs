@@ -30,6 +30,15 @@ pub enum LinkError {
         /// What was asked.
         command: Command,
     },
+    /// The same of a serial line, where more must agree.
+    #[error(
+        "no answer to {command}; the drive is off, restarting, or has another ID, baud rate or checksum{}",
+        unknown(*.command)
+    )]
+    Silence {
+        /// What was asked.
+        command: Command,
+    },
     /// Answers come, but they show the count of an earlier command.
     #[error(
         "the drive does not echo count {expected} of {command}, it shows count {shown} still{}",
@@ -172,7 +181,7 @@ impl Link for LinRsLink {
                     let found = format!("message {main:02X}h, sub ID {sub:02X}h");
                     Err(LinkError::WrongEcho { command, found })
                 }
-                _ => Err(LinkError::NoAnswer { command }),
+                _ => Err(LinkError::Silence { command }),
             };
         }
     }

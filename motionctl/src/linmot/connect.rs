@@ -100,12 +100,19 @@ fn endpoint(global: &Global, drive: &Drive) -> Result<(ChoiceOf, String), Exit> 
 impl From<LinkError> for Exit {
     fn from(error: LinkError) -> Self {
         let status = match error {
-            LinkError::NoAnswer { .. } | LinkError::NoEcho { .. } | LinkError::StillBusy { .. } => 3,
+            LinkError::NoAnswer { .. }
+            | LinkError::Silence { .. }
+            | LinkError::NoEcho { .. }
+            | LinkError::StillBusy { .. } => 3,
             LinkError::WrongEcho { .. } | LinkError::Restarted { .. } | LinkError::Aborted { .. } => 4,
             LinkError::NotCarried(_) => 2,
             _ => 5,
         };
-        Self { status, message: error.to_string() }
+        let mut message = error.to_string();
+        if matches!(error, LinkError::Silence { .. }) {
+            message += "; --node, baud=… of the endpoint and --checksum are to be as the drive's are";
+        }
+        Self { status, message }
     }
 }
 
