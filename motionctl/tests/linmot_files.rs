@@ -256,3 +256,26 @@ fn warnings_of_a_file_are_said_before_it_is_restored() {
     let asked = linmot.run(&["pvl", "restore", "B.pvl"]).ends(2);
     assert!(asked.stderr().find(words) < asked.stderr().find("--yes"), "{}", asked.stderr());
 }
+
+/// Steps between rounded setpoints are up to a unit longer than the motion's own.
+#[test]
+fn the_told_speed_of_a_built_curve_is_the_motions_own() {
+    let bench = Bench::new();
+    let build = |arguments: &[&str]| {
+        let json = bench.run(&[&["--json", "linmot", "curve", "build", "-o", "C.csv"], arguments].concat());
+        let json = json.ends(0).json();
+        assert!(json["curve"].get("id").is_none(), "{json}");
+        json["fastest_m_per_s"].as_f64()
+    };
+    let limits = ["--to", "1mm", "--velocity", "7mm/s", "--acceleration", "1m/s2", "--setpoints", "1000"];
+    let found = build(&limits).unwrap();
+    assert!(found <= 0.007 && found > 0.006_99, "{found}");
+    let steps = setpoints(&bench, "C.csv").windows(2).map(|two| two[1] - two[0]).max().unwrap();
+    assert!(steps > 10, "{steps}");
+    let shape = |profile| build(&["--to", "20mm", "--length", "200ms", "--profile", profile]);
+    let found = ["sine", "minimum-jerk", "trapezoid"].map(shape);
+    assert_eq!(found, [Some(0.157_079_6), Some(0.1875), Some(0.15)]);
+    assert_eq!(build(&["--to", "20mm", "--length", "200inc"]), None);
+    std::fs::write(bench.path("P.csv"), "0 0\n10 1\n40 -2\n").unwrap();
+    assert_eq!(build(&["--points", "P.csv", "--setpoints", "7"]), Some(0.1));
+}

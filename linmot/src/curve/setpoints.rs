@@ -33,6 +33,16 @@ impl Profile {
         }
     }
 
+    /// Its greatest velocity, which is that in the middle, as a multiple of the mean one.
+    #[must_use]
+    pub const fn peak(self) -> f64 {
+        match self {
+            Self::Sine => PI / 2.0,
+            Self::MinimumJerk => 1.875,
+            Self::Trapezoid => 1.5,
+        }
+    }
+
     /// Setpoint `number`, from 0, of a curve from `start` to `end` with so many setpoints, all in
     /// 0.1 µm: rounded half away from zero.
     #[must_use]
@@ -90,6 +100,14 @@ mod tests {
         assert_eq!(curve(Profile::Trapezoid, 72, 7), [0, 5, 18, 36, 54, 68, 72]);
         // 10 x³ - 15 x⁴ + 6 x⁵ at quarters: 106, 512 and 918 of 1024.
         assert_eq!(curve(Profile::MinimumJerk, 1024, 5), [0, 106, 512, 918, 1024]);
+    }
+
+    #[test]
+    fn the_peak_is_the_slope_in_the_middle() {
+        for profile in Profile::ALL {
+            let slope = (profile.share(0.501) - profile.share(0.499)) / 0.002;
+            assert!((slope - profile.peak()).abs() < 1e-4, "{profile:?}: {slope}");
+        }
     }
 
     #[test]

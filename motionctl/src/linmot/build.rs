@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 
-use linmot::curve::{CurveError, InfoBlock, Profile, Unit, resample, rounded};
+use linmot::curve::{CurveError, InfoBlock, Profile, resample, rounded};
 use linmot::pvl::Encoding;
 use motion_core::trajectory::{self, Limits, State};
 use serde_json::json;
@@ -19,9 +19,21 @@ use crate::output::{Output, counted};
 const SECOND: f64 = 1e5;
 /// Curves get their ID when they are added.
 const ANY_ID: u16 = 1;
+/// Setpoints' units in a metre.
+const METRE: f64 = 1e7;
+
+/// A curve without its ID and name.
+struct Built {
+    length: u32,
+    /// The length is in encoder increments.
+    cam: bool,
+    setpoints: Vec<i32>,
+    /// Greatest speed of the motion itself, from which rounded setpoints may differ, in m/s; of a curve over time.
+    fastest: Option<f64>,
+}
 
 pub(super) fn run(out: &Output, global: &Global, arguments: &Build) -> Result<(), Exit> {
-    let (length, cam, setpoints) = setpoints(arguments)?;
+    let Built { length, cam, setpoints, fastest } = built(arguments)?;
     let build = if cam { InfoBlock::cam } else { InfoBlock::position_over_time };
     let mut info = build(ANY_ID, "", length, arguments.setpoints).map_err(refused)?;
     let name = Encoding::Windows1252
@@ -30,7 +42,7 @@ pub(super) fn run(out: &Output, global: &Global, arguments: &Build) -> Result<()
         .ok_or_else(|| Exit::usage("--name: up to 21 characters of Windows-1252 expected"))?;
     info.name.iter_mut().zip(name).for_each(|(room, byte)| *room = byte);
     let file = arguments.output.display().to_string();
-    let fastest = fastest(&info, &setpoints);
+    let fastest = fastest.map(|speed| (speed * METRE).round() / METRE);
     let speed = fastest.map_or(String::new(), |speed| format!(", up to {speed:.4} m/s"));
     let text = curve::describe(&info);
     let text = text.trim_start().trim_start_matches(|c: char| c.is_ascii_digit()).trim_start();
@@ -39,7 +51,11 @@ pub(super) fn run(out: &Output, global: &Global, arguments: &Build) -> Result<()
         return Ok(());
     }
     curve::save(&arguments.output, &info, &setpoints)?;
-    let document = json!({ "curve": curve::to_json(&info), "file": file, "fastest": fastest });
+    let mut json = curve::to_json(&info);
+    if let Some(curve) = json.as_object_mut() {
+        curve.remove("id");
+    }
+    let document = json!({ "curve": json, "file": file, "fastest_m_per_s": fastest });
     out.document(document, || println!("{text}{speed}, written to {file}"));
     Ok(())
 }
@@ -48,8 +64,7 @@ fn refused(error: CurveError) -> Exit {
     Exit::usage(error.to_string())
 }
 
-/// x length, whether it is in encoder increments, and the setpoints.
-fn setpoints(arguments: &Build) -> Result<(u32, bool, Vec<i32>), Exit> {
+fn built(arguments: &Build) -> Result<Built, Exit> {
     let count = arguments.setpoints;
     if let Some(path) = &arguments.points {
         let points = points(path)?;
@@ -58,7 +73,13 @@ fn setpoints(arguments: &Build) -> Result<(u32, bool, Vec<i32>), Exit> {
         let ends = points.first().zip(points.last());
         let length = ends.map_or(0.0, |(first, last)| (last.0 - first.0) * scale);
         let setpoints = (0..count).filter_map(|number| resample(&points, number, count)).collect();
-        return Ok((whole("the points' length", length)?, arguments.cam, setpoints));
+        let slopes = points.iter().zip(points.iter().skip(1)).map(|(a, b)| ((b.1 - a.1) / (b.0 - a.0)).abs());
+        return Ok(Built {
+            length: whole("the points' length", length)?,
+            cam: arguments.cam,
+            setpoints,
+            fastest: (!arguments.cam).then(|| slopes.fold(0.0, f64::max) * 1000.0 / METRE),
+        });
     }
     let from = of(Kind::Position, "--from", arguments.from)?;
     let to = arguments.to.map_or(Ok(from), |to| of(Kind::Position, "--to", to))?;
@@ -79,15 +100,17 @@ fn setpoints(arguments: &Build) -> Result<(u32, bool, Vec<i32>), Exit> {
         ProfileName::Trapezoid => Profile::Trapezoid,
     };
     let (start, end) = (rounded(from), rounded(to));
-    let setpoints = (0..count).map(|number| profile.setpoint(start, end, number, count)).collect();
-    Ok((whole("--length", length)?, cam, setpoints))
+    let length = whole("--length", length)?;
+    let mean = (f64::from(end) - f64::from(start)).abs() / METRE / (f64::from(length) / SECOND);
+    Ok(Built {
+        length,
+        cam,
+        setpoints: (0..count).map(|number| profile.setpoint(start, end, number, count)).collect(),
+        fastest: (!cam).then_some(mean * profile.peak()),
+    })
 }
 
-fn within_limits(
-    arguments: &Build,
-    velocity: Quantity,
-    (from, to): (f64, f64),
-) -> Result<(u32, bool, Vec<i32>), Exit> {
+fn within_limits(arguments: &Build, velocity: Quantity, (from, to): (f64, f64)) -> Result<Built, Exit> {
     let velocity = of(Kind::Velocity, "--velocity", velocity)?;
     let acceleration = arguments.acceleration.ok_or_else(|| Exit::usage("--acceleration is missing"))?;
     let acceleration = of(Kind::Acceleration, "--acceleration", acceleration)?;
@@ -100,7 +123,14 @@ fn within_limits(
     let length = whole("the motion's length", (way.duration() * SECOND - 1e-6).ceil())?;
     let intervals = f64::from(arguments.setpoints - 1);
     let at = |number: u16| way.at(way.duration() * f64::from(number) / intervals).position;
-    Ok((length, false, (0..arguments.setpoints).map(|number| rounded(at(number))).collect()))
+    // From rest to rest within the same limits, it is fastest in the middle.
+    let fastest = way.at(way.duration() / 2.0).velocity.abs() / METRE;
+    Ok(Built {
+        length,
+        cam: false,
+        setpoints: (0..arguments.setpoints).map(|number| rounded(at(number))).collect(),
+        fastest: Some(fastest * way.duration() * SECOND / f64::from(length)),
+    })
 }
 
 fn of(kind: Kind, option: &str, quantity: Quantity) -> Result<f64, Exit> {
@@ -128,14 +158,6 @@ fn whole(what: &str, length: f64) -> Result<u32, Exit> {
             "{what}: 0.01 ms to 42949672.95 ms, or 1 to 4294967295 increments, expected"
         )))
     }
-}
-
-/// The greatest step between two setpoints of a curve over time, in m/s.
-fn fastest(info: &InfoBlock, setpoints: &[i32]) -> Option<f64> {
-    let step = f64::from(info.x_length) / SECOND / f64::from(info.setpoints - 1);
-    let steps = setpoints.iter().zip(setpoints.iter().skip(1));
-    let widest = steps.map(|(left, right)| (f64::from(*right) - f64::from(*left)).abs()).fold(0.0, f64::max);
-    (info.x_unit == Unit::TIME).then_some(widest / 1e7 / step)
 }
 
 /// Lines of x and y; y comes in mm and goes in 0.1 µm. x ascends.
