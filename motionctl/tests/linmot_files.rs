@@ -93,6 +93,35 @@ fn curves_are_built_without_a_drive() {
     build(&["--to", "500m", "--length", "1s"]).ends(2).says("--to: -214748mm to 214748mm expected");
 }
 
+/// Limits that no motion can have are told by their option, in its unit.
+#[test]
+fn limits_of_nothing_are_refused_by_their_option() {
+    let bench = Bench::new();
+    for (to, velocity, acceleration, jerk, words) in [
+        (
+            "1mm",
+            "0m/s",
+            "1m/s2",
+            "1m/s3",
+            "error: --velocity: a velocity in mm/s or m/s, above 0, expected\n",
+        ),
+        (
+            "1mm",
+            "1m/s",
+            "0mm/s2",
+            "1m/s3",
+            "--acceleration: an acceleration in mm/s2 or m/s2, above 0, expected",
+        ),
+        ("1mm", "1m/s", "1m/s2", "0mm/s3", "--jerk: a jerk in mm/s3 or m/s3, above 0, expected"),
+        ("1mm", "100000000000000m/s", "1m/s2", "1m/s3", "--velocity: out of range"),
+        ("0mm", "1m/s", "1m/s2", "1m/s3", "--to: another position than --from expected, or --length"),
+    ] {
+        let build = ["linmot", "curve", "build", "-o", "C.csv", "--to", to, "--velocity", velocity];
+        let limits = ["--acceleration", acceleration, "--jerk", jerk];
+        bench.run(&[&build[..], &limits].concat()).ends(2).says(words);
+    }
+}
+
 /// y is in mm in the file and in 0.1 µm of 32 bits in the curve: what does not fit is not cut off.
 #[test]
 fn points_beyond_a_setpoints_range_are_refused() {

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use linmot::curve::{CurveError, InfoBlock, Profile, resample, rounded};
 use linmot::pvl::Encoding;
-use motion_core::trajectory::{self, Limits, State};
+use motion_core::trajectory::{self, LimitError, Limits, State};
 use serde_json::json;
 
 use super::cli::{Build, Kind, ProfileName, Quantity};
@@ -115,8 +115,13 @@ fn within_limits(arguments: &Build, velocity: Quantity, (from, to): (f64, f64)) 
     let acceleration = arguments.acceleration.ok_or_else(|| Exit::usage("--acceleration is missing"))?;
     let acceleration = of(Kind::Acceleration, "--acceleration", acceleration)?;
     let jerk = arguments.jerk.map_or(Ok(f64::INFINITY), |jerk| of(Kind::Jerk, "--jerk", jerk))?;
-    let limits = Limits::new(velocity, acceleration, acceleration, jerk)
-        .map_err(|error| Exit::usage(format!("in 0.1 um and seconds: {error}")))?;
+    if rounded(from) == rounded(to) {
+        return Err(Exit::usage("--to: another position than --from expected, or --length to rest so long"));
+    }
+    let limits = Limits::new(velocity, acceleration, acceleration, jerk).map_err(|error| match error {
+        LimitError::Range { name, .. } => Exit::usage(format!("--{name}: out of range")),
+        other => Exit::usage(other.to_string()),
+    })?;
     let mut way = trajectory::Profile::at_rest(from);
     way.move_to(&State::at_rest(from), &limits, to).map_err(|error| Exit::usage(error.to_string()))?;
     // The whole 10 us that the way fits into but for rounding; the drive runs that much slower.
@@ -141,10 +146,13 @@ fn of(kind: Kind, option: &str, quantity: Quantity) -> Result<f64, Exit> {
         Kind::Jerk => "a jerk in mm/s3 or m/s3",
         Kind::Time | Kind::Increments => "a time in ms or s, or increments in inc",
     };
-    if quantity.kind == kind {
-        Ok(quantity.value)
-    } else {
+    let is_limit = matches!(kind, Kind::Velocity | Kind::Acceleration | Kind::Jerk);
+    if quantity.kind != kind {
         Err(Exit::usage(format!("{option}: {expected} expected")))
+    } else if is_limit && quantity.value <= 0.0 {
+        Err(Exit::usage(format!("{option}: {expected}, above 0, expected")))
+    } else {
+        Ok(quantity.value)
     }
 }
 
