@@ -103,7 +103,7 @@ pub fn read(file: &mut impl BufRead, id: u16) -> Result<(InfoBlock, Vec<i32>), C
     let first =
         lines.next_line()?.map(|(_, line)| decoder.decode(line).trim().to_owned()).unwrap_or_default();
     let Some(head) = first.strip_prefix('#') else { return Err(wrong(1, HEAD, &first)) };
-    let head = Head(head.trim());
+    let head = Head::parse(head.trim())?;
     let mut setpoints = Vec::new();
     while let Some((number, line)) = lines.next_line()? {
         let text = decoder.decode(line);
@@ -130,28 +130,46 @@ pub fn read(file: &mut impl BufRead, id: u16) -> Result<(InfoBlock, Vec<i32>), C
     Ok((info, setpoints))
 }
 
-/// The head line without its `#`.
-struct Head<'a>(&'a str);
+/// The attributes of the head line.
+struct Head<'a> {
+    /// The line without its `#`.
+    text: &'a str,
+    values: Vec<(&'static str, String)>,
+}
 
-impl Head<'_> {
-    /// The value of an attribute: what is between its quotes, or up to the next attribute.
-    fn get(&self, wanted: &str) -> Option<String> {
-        let mut rest = self.0;
-        loop {
-            let (key, at) = next_key(rest)?;
-            let value = rest.get(at + key.len() + 1..)?;
+impl<'a> Head<'a> {
+    /// A value is what is between its quotes, or up to the next attribute. Each attribute comes once, and none
+    /// that is unknown: an equals sign in a value without quotes belongs to one.
+    fn parse(text: &'a str) -> Result<Self, CurveFileError> {
+        let mut values: Vec<(&'static str, String)> = Vec::new();
+        let mut rest = text;
+        while let Some((key, at)) = next_key(rest) {
+            none_unknown(rest.get(..at).unwrap_or_default())?;
+            let value = rest.get(at + key.len() + 1..).unwrap_or_default();
             let (value, behind) = match value.strip_prefix('"') {
                 Some(quoted) => unquoted(quoted),
                 None => {
-                    let end = next_key(value).map_or(value.len(), |(_, at)| at);
-                    (value.get(..end)?.trim().to_owned(), value.get(end..)?)
+                    let (value, behind) = value.split_at(next_key(value).map_or(value.len(), |(_, at)| at));
+                    none_unknown(value)?;
+                    (value.trim().to_owned(), behind)
                 }
             };
-            if key == wanted {
-                return Some(value);
+            if values.iter().any(|(other, _)| *other == key) {
+                return Err(wrong(1, "each attribute once", &format!("{key}={value}")));
             }
+            values.push((key, value));
             rest = behind;
         }
+        none_unknown(rest)?;
+        let head = Self { text, values };
+        if head.get("length_ms").is_some() && head.get("length").is_some() {
+            return Err(wrong(1, "length_ms=MILLISECONDS or length=INCREMENTS, one of them,", text));
+        }
+        Ok(head)
+    }
+
+    fn get(&self, wanted: &str) -> Option<&str> {
+        self.values.iter().find(|(key, _)| *key == wanted).map(|(_, value)| value.as_str())
     }
 
     /// The value of an attribute, which must be as `expected` says if it is there.
@@ -162,32 +180,38 @@ impl Head<'_> {
         parse: impl FnOnce(&str) -> Option<T>,
     ) -> Result<Option<T>, CurveFileError> {
         self.get(key)
-            .map(|value| parse(&value).ok_or_else(|| wrong(1, expected, &format!("{key}={value}"))))
+            .map(|value| parse(value).ok_or_else(|| wrong(1, expected, &format!("{key}={value}"))))
             .transpose()
     }
 
     fn info(&self, id: u16, setpoints: u16) -> Result<InfoBlock, CurveFileError> {
-        let cam = self.get("length").is_some() || self.get("type").as_deref() == Some("cam");
+        let cam = self.get("length").is_some() || self.get("type") == Some("cam");
         let length = if cam {
             self.parsed("length", "length=INCREMENTS", |value| value.parse().ok())?
         } else {
-            self.parsed("length_ms", "length_ms=MILLISECONDS, 0.01 to 42949672.95,", |value| {
-                // In 10 µs.
-                let length = (value.parse::<f64>().ok()? * 100.0).round();
-                (1.0..=f64::from(u32::MAX)).contains(&length).then_some(length as u32)
-            })?
+            self.parsed(
+                "length_ms",
+                "length_ms=MILLISECONDS, 0.01 to 42949672.95 in steps of 0.01,",
+                |value| {
+                    // In 10 µs.
+                    let exact = value.parse::<f64>().ok()? * 100.0;
+                    let length = exact.round();
+                    let fits = (1.0..=f64::from(u32::MAX)).contains(&length) && (exact - length).abs() < 1e-5;
+                    fits.then_some(length as u32)
+                },
+            )?
         };
         let missing = if cam { "length=INCREMENTS" } else { "length_ms=MILLISECONDS" };
-        let length = length.ok_or_else(|| wrong(1, missing, self.0))?;
+        let length = length.ok_or_else(|| wrong(1, missing, self.text))?;
         let build = if cam { InfoBlock::cam } else { InfoBlock::position_over_time };
         let mut info = build(id, "", length, setpoints)?;
         self.parsed("unit", "unit=0.1um", |value| matches!(value, "0.1um" | "raw").then_some(()))?;
         if let Some(name) = self.get("name") {
-            let bytes = Encoding::Windows1252.encode_exactly(&name);
+            let bytes = Encoding::Windows1252.encode_exactly(name);
             let bytes =
                 bytes.filter(|bytes| bytes.len() < info.name.len() && !name.contains(char::is_control));
             let bytes =
-                bytes.ok_or_else(|| wrong(1, "a name of up to 21 characters of Windows-1252", &name))?;
+                bytes.ok_or_else(|| wrong(1, "a name of up to 21 characters of Windows-1252", name))?;
             info.name.iter_mut().zip(bytes).for_each(|(room, byte)| *room = byte);
         }
         let kind = self.parsed("type", "type=0x0003, type=0x0103 or type=cam", |value| match value {
@@ -219,6 +243,14 @@ fn next_key(text: &str) -> Option<(&'static str, usize)> {
             .find(|(_, at)| begins(*at))
     })?;
     Some(found)
+}
+
+/// Refuses text between attributes that an unknown one is in.
+fn none_unknown(text: &str) -> Result<(), CurveFileError> {
+    match text.split_whitespace().find(|word| word.contains('=')) {
+        Some(word) => Err(wrong(1, "a known attribute, or quotes around a value with an equals sign,", word)),
+        None => Ok(()),
+    }
 }
 
 /// A quoted value from behind its first quote, and what comes after it; `""` is one quote in it.
@@ -310,6 +342,22 @@ mod tests {
             ("# length_ms=NaN\n0\n1\n", "\"length_ms=NaN\" found"),
             ("# length=1.5\n0\n1\n", "length=INCREMENTS expected, \"length=1.5\" found"),
             ("# length_ms=1 unit=mm\n0\n1\n", "unit=0.1um expected, \"unit=mm\" found"),
+            (
+                "# length_ms=0.0149\n0\n1\n",
+                "0.01 to 42949672.95 in steps of 0.01, expected, \"length_ms=0.0149\"",
+            ),
+            (
+                "# length_ms=1 lenght=5\n0\n1\n",
+                "a known attribute, or quotes around a value with an equals sign",
+            ),
+            ("# name=a units=mm length_ms=1\n0\n1\n", "expected, \"units=mm\" found"),
+            ("# x=1 length_ms=1\n0\n1\n", "\"x=1\" found"),
+            ("# name=\"a\" x=1\n0\n1\n", "\"x=1\" found"),
+            (
+                "# length_ms=1 name=a length_ms=2\n0\n1\n",
+                "each attribute once expected, \"length_ms=2\" found",
+            ),
+            ("# length_ms=1 length=2\n0\n1\n", "length_ms=MILLISECONDS or length=INCREMENTS, one of them,"),
             ("# length_ms=1 type=0x1003\n0\n1\n", "object type 1003h"),
             ("# length_ms=1 x_unit=0x10000\n0\n1\n", "x_unit=0x001A expected"),
             ("# length_ms=1 wizard=0:1\n0\n1\n", "wizard=TYPE:PAR1:…:PAR7 expected"),
