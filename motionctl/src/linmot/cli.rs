@@ -434,7 +434,7 @@ pub(crate) enum Pvl {
         #[arg(long, value_enum, default_value_t = EncodingName::Windows1252)]
         encoding: EncodingName,
     },
-    /// A file into ROM values and curves, RAM and flash
+    /// A file into ROM values and curves, RAM and flash; parameters that it does not list stay as they are
     Restore {
         #[command(flatten)]
         drive: Drive,
@@ -443,7 +443,7 @@ pub(crate) enum Pvl {
         #[arg(long)]
         replace_curves: bool,
     },
-    /// A file with the drive
+    /// A file with the drive; parameters that it does not list are not compared
     Compare {
         #[command(flatten)]
         drive: Drive,
