@@ -10,6 +10,9 @@ use motion_core::{Model, STORAGE_LEN, is_damaged, stored_model};
 use crate::exit::Exit;
 use crate::output::Output;
 
+/// Bytes of a state that was made before it had the model at its end.
+const BEFORE_MODEL: usize = 141_072;
+
 /// Non-volatile memory in a file, which no other program may use meanwhile.
 pub(crate) struct FileStorage(File);
 
@@ -33,10 +36,12 @@ impl FileStorage {
     fn open(path: &Path) -> std::io::Result<Self> {
         let file = File::options().read(true).write(true).create(true).truncate(false).open(path)?;
         file.try_lock().map_err(|_| std::io::Error::other("in use by another program"))?;
-        match file.metadata()?.len() {
-            // New.
-            0 => (&file).write_all(&vec![0xFF; STORAGE_LEN])?,
-            len if len == STORAGE_LEN as u64 => {}
+        match file.metadata()?.len() as usize {
+            len @ (0 | BEFORE_MODEL) => {
+                (&file).seek(SeekFrom::End(0))?;
+                (&file).write_all(&vec![0xFF; STORAGE_LEN - len])?;
+            }
+            STORAGE_LEN => {}
             // Somebody's file, which must not become another one's memory.
             len => {
                 let text = format!("no state of a controller: {STORAGE_LEN} bytes expected, it has {len}");

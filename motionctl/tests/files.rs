@@ -75,9 +75,23 @@ fn a_file_that_is_no_state_is_refused() {
     for line in [["--serial", "pty:LINE"], ["--can1", "virtual:a"]] {
         let state = ["--state", "machine.toml"];
         let done = bench.run(&[&["sim", "controller"][..], &line, &state].concat());
-        done.ends(5).says("no state of a controller: 141072 bytes expected, it has 19");
+        done.ends(5).says("no state of a controller: 141104 bytes expected, it has 19");
     }
     assert_eq!(std::fs::read_to_string(bench.path("machine.toml")).unwrap(), "schema_version = 1\n");
+}
+
+/// States grew by the model; those from before are states still.
+#[test]
+fn a_state_from_before_it_had_the_model_is_read() {
+    let bench = Bench::new();
+    let first = bench.controller(&[]);
+    bench.run(&["params", "set", "--port", "LINE", "642", "777", "--save"]).ends(0);
+    first.kill();
+    std::fs::File::options().write(true).open(bench.path("FLASH")).unwrap().set_len(141_072).unwrap();
+    let second = bench.controller(&[]);
+    bench.run(&["params", "get", "--port", "LINE", "642"]).ends(0).says("777");
+    assert_eq!(std::fs::metadata(bench.path("FLASH")).unwrap().len(), 141_104);
+    drop(second);
 }
 
 /// A second program took the link of the first, which ran on where nobody could reach it.
