@@ -434,3 +434,19 @@ fn wrong_usage_is_named() {
     let ran = run(&build).ends(5);
     assert_eq!(ran.stderr(), "error: none/C.csv: No such file or directory (os error 2)\n");
 }
+
+#[test]
+fn a_damaged_state_file_is_told_in_words() {
+    let bench = Bench::new();
+    for (content, words) in [
+        (&b"no image"[..], "it does not begin with VLM1"),
+        (b"VLM1\x01", "its length is no multiple of 4 bytes"),
+        (b"VLM1\x01\0\0\0", "it is cut off"),
+        (b"VLM1\x01\0\0\0\0\0\x01\0\0\0\0\0", "a UPID, curve or entry number is above 65535"),
+    ] {
+        std::fs::write(bench.path("FLASH"), content).unwrap();
+        let sim = ["sim", "linmot", "--can=slcan-pty:LINE", "--state", "FLASH"];
+        let words = format!("error: FLASH: no image of a virtual LinMot drive's memory: {words}\n");
+        assert_eq!(bench.run(&sim).ends(5).stderr(), words);
+    }
+}

@@ -56,13 +56,17 @@ impl Flash {
     }
 
     pub(super) fn from_bytes(bytes: &[u8]) -> Result<Self, ImageError> {
-        let (words, []) = bytes.as_chunks::<4>() else { return Err(ImageError("its length")) };
+        let (words, []) = bytes.as_chunks::<4>() else {
+            return Err(ImageError("its length is no multiple of 4 bytes"));
+        };
         let mut words = words.iter().map(|four| u32::from_le_bytes(*four));
         let mut next = || words.next().ok_or(ImageError("it is cut off"));
         if next()? != MAGIC {
-            return Err(ImageError("its beginning"));
+            return Err(ImageError("it does not begin with VLM1"));
         }
-        let key = |word: u32| u16::try_from(word).map_err(|_| ImageError("a number"));
+        let key = |word: u32| {
+            u16::try_from(word).map_err(|_| ImageError("a UPID, curve or entry number is above 65535"))
+        };
         let mut flash = Self::default();
         for _ in 0..next()? {
             flash.rom.insert(key(next()?)?, next()?);
@@ -92,7 +96,8 @@ impl Flash {
                 for word in &mut words {
                     *word = next()?;
                 }
-                let entry = Entry::from_words(&words).map_err(|_| ImageError("a table entry"))?;
+                let entry =
+                    Entry::from_words(&words).map_err(|_| ImageError("a command table entry is none"))?;
                 table.insert(number, entry);
             }
             flash.table = Some(table);
