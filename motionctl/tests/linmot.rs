@@ -425,6 +425,10 @@ fn wrong_usage_is_named() {
     // The endpoint as it was written, not the part of it that failed.
     with(&["--can", "slcan:NONE"]).ends(5).says("error: slcan:NONE").says("no such port");
     run(&["sim", "linmot"]).ends(2).says("--can EP or --serial EP expected");
+    for dry_run in [&[][..], &["--dry-run"]] {
+        let none = ["sim", "linmot", "--can", "slcan-pty:LINE", "--node", "0"];
+        run(&[dry_run, &none].concat()).ends(2).says("--node 0: 1 to 127, or 255");
+    }
     let many = ["sim", "linmot", "--can", "slcan-pty:LINE", "--parameters", "20000"];
     run(&many).ends(2).says("--parameters 20000: up to 8229 expected");
     run(&["sim", "linmot", "--can", "slcan-pty:none/X"])

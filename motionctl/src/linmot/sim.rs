@@ -36,6 +36,7 @@ pub(crate) fn run(out: &Output, global: &Global, arguments: &SimLinmot) -> Resul
     if writable < arguments.parameters {
         return Err(Exit::usage(format!("--parameters {}: up to {writable} expected", arguments.parameters)));
     }
+    let node = if arguments.can.is_some() { crate::can::sim::address(arguments.node)? } else { None };
     let places = || [&arguments.can, &arguments.serial].into_iter().flatten().cloned().collect::<Vec<_>>();
     if out.only_plans(|| format!("would be a LinMot drive {} on {}", arguments.node, places().join(", "))) {
         return Ok(());
@@ -60,7 +61,6 @@ pub(crate) fn run(out: &Output, global: &Global, arguments: &SimLinmot) -> Resul
     if let Some(can) = &arguments.can {
         let can = &choose(global, Some(can), ChoiceOf::Can)?;
         let endpoint: CanEndpoint = can.parse().map_err(usage)?;
-        let node = crate::can::sim::address(arguments.node)?;
         let port = motion_io::can::open(&endpoint).map_err(|error| Exit::trouble(error.to_string()))?;
         let (mut driver, mut node) = (Driver::new(port), CanDrive::new(drive, node, arguments.serial_number));
         ready(can);
