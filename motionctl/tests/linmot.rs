@@ -388,8 +388,8 @@ fn a_dry_run_says_its_plan_in_words_or_as_json() {
         (&["curve", "get", "5", "-o", "D.csv"], "would read curve 5 and write it to D.csv"),
         (&["curve", "save"], "would save all curves to flash"),
         (&["curve", "delete-all"], "would delete all curves in RAM"),
-        (&["table", "set", "5", "--raw", &entry], "would write entry 5"),
-        (&["table", "delete", "5"], "would delete entry 5"),
+        (&["table", "set", "5", "--raw", &entry], "would write entry 5 in RAM"),
+        (&["table", "delete", "5"], "would delete entry 5 in RAM"),
         (&["table", "delete-all"], "would delete all entries in RAM"),
         (&["table", "save"], "would save the command table to flash"),
         (&["table", "backup", "T.toml"], "would write 0 entries to T.toml"),
@@ -407,7 +407,7 @@ fn a_dry_run_says_its_plan_in_words_or_as_json() {
     for file in ["B.pvl", "D.csv", "T.toml"] {
         assert!(!bench.path(file).exists(), "{file}");
     }
-    linmot.run(&["params", "list", "--changed"]).ends(0).says("no parameters");
+    linmot.run(&["params", "list", "--changed"]).ends(0).says("none changed");
 }
 
 /// What the command line cannot mean is refused before anything is opened, in the user's words.
@@ -453,4 +453,29 @@ fn a_damaged_state_file_is_told_in_words() {
         let words = format!("error: FLASH: no image of a virtual LinMot drive's memory: {words}\n");
         assert_eq!(bench.run(&sim).ends(5).stderr(), words);
     }
+}
+
+/// ROM without RAM, and RAM without flash.
+#[test]
+fn what_does_not_act_yet_or_does_not_last_is_said() {
+    let bench = Bench::new();
+    let _drive = drive(&bench, "--can=slcan-pty:LINE");
+    let linmot = Linmot { bench: &bench, carrier: &["--can", "slcan:LINE"] };
+    linmot.run(&["pvl", "backup", "B.pvl"]).ends(0);
+    let restart = "after a restart";
+    linmot
+        .run(&["params", "set", "119Eh", "--", "5"])
+        .ends(0)
+        .says(&format!("note: the ROM value acts {restart}"));
+    let live = linmot.run(&["params", "set", "13A2h", "--", "10"]).ends(0);
+    assert!(!live.stderr().contains(restart), "{}", live.stderr());
+    let restore = ["--yes", "pvl", "restore", "B.pvl"];
+    linmot.run(&restore).ends(0).says(&format!("note: the ROM values act {restart}"));
+    let nothing = linmot.run(&restore).ends(0);
+    assert!(!nothing.stderr().contains(restart), "{}", nothing.stderr());
+    linmot
+        .run(&["table", "set", "5", "--raw", &entry(0xFFFF, "x")])
+        .ends(0)
+        .says("note: entry 5 is in RAM, ");
+    linmot.run(&["table", "delete", "5"]).ends(0).says("entry 5 deleted in RAM");
 }

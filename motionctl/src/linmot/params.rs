@@ -144,7 +144,7 @@ fn list(out: &Output, global: &Global, drive: &Drive, changed: bool) -> Result<(
     let json: Vec<Json> = list.iter().map(to_json).collect();
     out.document(json!({ "parameters": json }), || {
         if list.is_empty() {
-            println!("no parameters");
+            println!("{}", if changed { "none changed" } else { "no parameters" });
         }
         list.iter().for_each(print);
     });
@@ -296,6 +296,9 @@ fn set(
     }
     let mut shown = read(&mut link, upid, usage, BOTH)?;
     shown.range = told.or(shown.range);
+    if memory == Memory::Rom {
+        out.remark("the ROM value acts after a restart");
+    }
     out.document(json!({ "parameters": [to_json(&shown)] }), || print(&shown));
     Ok(())
 }

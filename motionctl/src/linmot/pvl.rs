@@ -142,6 +142,9 @@ fn restore(
         ))
     })?;
     let Progress { parameters, written, curves, setpoints, .. } = done;
+    if written > 0 && !global.dry_run {
+        out.remark("the ROM values act after a restart");
+    }
     let json = json!({
         "dry_run": global.dry_run, "parameters": parameters, "written": written,
         "curves": curves, "setpoints": setpoints, "saved": !global.dry_run,

@@ -31,7 +31,7 @@ pub(super) fn run(out: &Output, global: &Global, command: &Table) -> Result<(), 
         Table::Set { drive, entry, raw } => set(out, global, drive, *entry, raw),
         Table::Delete { drive, entry } => {
             if global.dry_run {
-                out.plan(&format!("would delete entry {entry}"));
+                out.plan(&format!("would delete entry {entry} in RAM"));
                 return Ok(());
             }
             connect(global, drive)?.ask(Request::DeleteEntry { entry: *entry })?;
@@ -108,11 +108,12 @@ fn show(out: &Output, entries: &Entries) {
 fn set(out: &Output, global: &Global, drive: &Drive, number: u16, raw: &str) -> Result<(), Exit> {
     let entry = parse(raw).map_err(|error| Exit::usage(format!("--raw: {error}")))?;
     if global.dry_run {
-        out.plan(&format!("would write entry {number}"));
+        out.plan(&format!("would write entry {number} in RAM"));
         return Ok(());
     }
     let mut link = connect(global, drive)?;
     write(&mut link, number, &entry)?;
+    out.remark(format!("entry {number} is in RAM, `table save` writes all to flash"));
     show(out, &Entries::from([(number, entry)]));
     Ok(())
 }
