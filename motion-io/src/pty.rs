@@ -65,6 +65,13 @@ impl Pty {
 #[cfg(target_os = "linux")]
 type Claim = std::os::unix::net::UnixDatagram;
 
+/// A claim outlives its pseudo-terminal by the moment that a program which is just being started, and began as a
+/// copy of this one, still has it: so it is tried for half a second.
+#[cfg(target_os = "linux")]
+const TRIES: u32 = 100;
+#[cfg(target_os = "linux")]
+const RETRY: Duration = Duration::from_millis(5);
+
 #[cfg(target_os = "linux")]
 fn claim(link: &Path) -> io::Result<Option<Claim>> {
     use core::hash::{Hash as _, Hasher as _};
@@ -77,14 +84,15 @@ fn claim(link: &Path) -> io::Result<Option<Claim>> {
     let mut hasher = DefaultHasher::new();
     (directory.dev(), directory.ino(), link.file_name()).hash(&mut hasher);
     let address = SocketAddr::from_abstract_name(format!("motion-io pty {:016x}", hasher.finish()))?;
-    match Claim::bind_addr(&address) {
-        Ok(claim) => Ok(Some(claim)),
-        Err(error) if error.kind() == io::ErrorKind::AddrInUse => {
-            Err(io::Error::other("in use by another program"))
+    for _ in 0..TRIES {
+        match Claim::bind_addr(&address) {
+            Ok(claim) => return Ok(Some(claim)),
+            Err(error) if error.kind() == io::ErrorKind::AddrInUse => std::thread::sleep(RETRY),
+            // A system that has no such sockets.
+            Err(_) => return Ok(None),
         }
-        // A system that has no such sockets.
-        Err(_) => Ok(None),
     }
+    Err(io::Error::other("in use by another program"))
 }
 
 #[cfg(not(target_os = "linux"))]
