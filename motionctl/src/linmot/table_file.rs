@@ -8,7 +8,7 @@ use toml_edit::{ArrayOfTables, Item, Table};
 
 use super::text;
 use crate::exit::Exit;
-use crate::output::write_beside;
+use crate::output::{counted, write_beside};
 
 /// Entries by number.
 pub(super) type Entries = BTreeMap<u16, Entry>;
@@ -93,7 +93,7 @@ pub(super) fn load(path: &Path) -> Result<Entries, Exit> {
         Some(said) if said.as_integer() != Some(entries.len() as i64) => Err(wrong(&format!(
             "entries = {} in its head, {} there: the file was cut off or changed",
             said.to_string().trim(),
-            if entries.len() == 1 { "1 is".into() } else { format!("{} are", entries.len()) }
+            counted(entries.len(), "is", "are")
         ))),
         // Older files have no number.
         _ => Ok(entries),
