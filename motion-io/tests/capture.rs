@@ -1,5 +1,6 @@
 //! Reading and writing capture files through the public interface.
 
+use std::io::{self, Read};
 use std::path::Path;
 
 use motion_io::capture::{
@@ -16,7 +17,11 @@ type Expected<'a> = (Option<i64>, Option<&'a str>, Option<Direction>, Frame);
 
 /// Every frame with its bus, and every damage as text.
 fn read(content: &[u8]) -> (Format, Vec<Named>, Vec<String>) {
-    let Capture::Can(mut reader) = open(content).expect("a capture") else { panic!("LB2") };
+    read_from(content)
+}
+
+fn read_from(source: impl Read) -> (Format, Vec<Named>, Vec<String>) {
+    let Capture::Can(mut reader) = open(source).expect("a capture") else { panic!("LB2") };
     let (mut frames, mut damage) = (Vec::new(), Vec::new());
     loop {
         match reader.next().expect("memory does not fail") {
@@ -84,6 +89,35 @@ fn candump_log() {
             (None, None, None, standard(0x5A1, &[0x11, 0x22, 0x33, 0x44, 0x55, 0x66, 0x77, 0x88])),
         ],
     );
+}
+
+/// Gives few bytes at a time, so that a line is never held whole with what follows it.
+struct Trickle<'a>(&'a [u8]);
+
+impl Read for Trickle<'_> {
+    fn read(&mut self, room: &mut [u8]) -> io::Result<usize> {
+        self.0.read(room.get_mut(..5).expect("room"))
+    }
+}
+
+/// Lines that are held whole are read in fewer steps: every character at every place.
+#[test]
+fn a_log_line_is_the_same_held_whole_and_in_pieces() {
+    let mut frames = 0;
+    for line in ["(1436509052.249713) can0 581#4B41600018028FAF\n", "(1436509052.249713) can0 080#\r\n"] {
+        for at in 0..line.len() {
+            for byte in 0..=255 {
+                let mut changed = line.as_bytes().to_vec();
+                changed[at] = byte;
+                let content = [line.as_bytes(), &changed, line.repeat(3).as_bytes()].concat();
+                let whole = read(&content);
+                assert_eq!(whole, read_from(Trickle(&content)), "{}", content.escape_ascii());
+                frames += whole.1.len();
+            }
+        }
+    }
+    // Most changes damage a line, some join it with the next one.
+    assert!(frames > 5 * 256 * 60, "{frames}");
 }
 
 #[test]

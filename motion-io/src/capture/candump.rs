@@ -1,6 +1,7 @@
 //! candump of can-utils: `-l` logs (`(1436509052.249713) can0 581#4B41600018028FAF`) and screen text
 //! (` (000.001)  can0  TX - -  581   [8]  4B 41 60 00 18 02 8F AF   'KA`.....'`).
 
+use super::log_line::LogLines;
 use super::reader::{INNER_CR, Parsed, has_inner_cr};
 use super::record::{Buses, Direction, FrameKind, MAX_DATA, Record, Time};
 use super::scan::{date_time, decimal, fixed, hex, hex_byte, hex_run, nibble, word};
@@ -13,58 +14,29 @@ const SECONDS: i64 = 1_000_000_000;
 /// Reads candump lines of either form, line by line.
 #[derive(Debug, Default)]
 pub(super) struct Candump {
-    /// Whole seconds of the line before, as text and as nanoseconds: the next line mostly has the same.
-    seconds: ([u8; 10], i64),
+    log: LogLines,
     /// The line before was an error report, whose explanation may follow on lines of its own.
     after_error: bool,
 }
 
 impl Candump {
+    /// A line of the common form at the start of what is held; its length with its end. `None` of any
+    /// other line, and of one that is not held whole.
     #[inline]
-    pub(super) fn line(&mut self, line: &[u8], record: &mut Record, buses: &mut Buses) -> Parsed {
-        if self.log_line(line, record, buses).is_some() {
-            self.after_error = false;
-            return Parsed::Frame;
-        }
-        self.any_line(line, record, buses)
+    pub(super) fn log_line(&mut self, held: &[u8], record: &mut Record) -> Option<usize> {
+        let len = self.log.line(held, record)?;
+        self.after_error = false;
+        Some(len)
     }
 
-    /// A line as `candump -l` writes nearly all of them: epoch time with microseconds, the bus of the
-    /// line before, a data frame with an 11-bit identifier. `None` of any other.
-    #[inline]
-    fn log_line(&mut self, line: &[u8], record: &mut Record, buses: &Buses) -> Option<()> {
-        let (head, rest) = line.split_first_chunk::<20>()?;
-        let &[b'(', ref seconds @ .., b'.', a, b, c, d, e, f, b')', b' '] = head else { return None };
-        let (bus, name) = buses.last()?;
-        let rest = rest.strip_prefix(name)?;
-        let (&[b' ', i, j, k, b'#'], data) = rest.split_first_chunk::<5>()? else { return None };
-        let (i, j, k) = (nibble(i), nibble(j), nibble(k));
-        if i | j | k > 0x0F || i > 7 {
-            return None;
+    pub(super) fn line(&mut self, line: &[u8], record: &mut Record, buses: &mut Buses) -> Parsed {
+        let parsed = self.any_line(line, record, buses);
+        if parsed == Parsed::Frame
+            && let Some(bus) = record.bus
+        {
+            self.log.set_bus(bus, buses.name(bus).unwrap_or(""));
         }
-        let room = record.frame.data.first_chunk_mut::<8>()?;
-        let len = hex_run(data, room)?;
-        let mut micros = 0;
-        for digit in [a, b, c, d, e, f] {
-            if !digit.is_ascii_digit() {
-                return None;
-            }
-            micros = micros * 10 + u32::from(digit - b'0');
-        }
-        if self.seconds.0 != *seconds {
-            let whole = i64::try_from(decimal(seconds)?).ok()?;
-            // A time that does not fit is told by the general reader.
-            self.seconds = (*seconds, whole.checked_mul(SECONDS)?);
-        }
-        record.time = Some(Time(self.seconds.1.checked_add(i64::from(micros) * 1000)?));
-        record.bus = Some(bus);
-        record.direction = None;
-        record.loopback = false;
-        record.frame.id = u32::from(i) << 8 | u32::from(j) << 4 | u32::from(k);
-        record.frame.extended = false;
-        record.frame.kind = FrameKind::Data;
-        record.frame.len = len as u8;
-        Some(())
+        parsed
     }
 
     fn any_line(&mut self, line: &[u8], record: &mut Record, buses: &mut Buses) -> Parsed {

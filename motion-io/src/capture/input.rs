@@ -70,7 +70,14 @@ impl<R: Read> Input<R> {
         Ok(self.held(self.start..self.end.min(self.start + len)))
     }
 
-    /// Takes `len` bytes that [`peek`](Self::peek) has shown.
+    /// What has been read and not been taken.
+    #[inline]
+    pub(super) fn at_hand(&self) -> &[u8] {
+        self.held(self.start..self.end)
+    }
+
+    /// Takes `len` bytes that have been shown.
+    #[inline]
     pub(super) fn take(&mut self, len: usize) {
         self.start = self.end.min(self.start + len);
     }

@@ -23,6 +23,7 @@ mod candump;
 mod columns;
 mod input;
 mod lb2;
+mod log_line;
 mod pcap;
 mod reader;
 mod record;

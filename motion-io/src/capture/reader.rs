@@ -157,6 +157,13 @@ impl<R: Read> Reader<R> {
         loop {
             let (parsed, place) = match &mut self.parser {
                 Parser::Text(parser) => {
+                    if let TextParser::Candump(parser) = parser
+                        && let Some(len) = parser.log_line(self.input.at_hand(), &mut self.record)
+                    {
+                        self.input.take(len);
+                        self.line += 1;
+                        break;
+                    }
                     let Some(line) = self.input.line()? else { return Ok(None) };
                     self.line += 1;
                     match line {

@@ -163,6 +163,13 @@ impl Frame {
         self.data.get(..self.len()).unwrap_or(&[])
     }
 
+    /// The first 8 bytes of the data, whatever its length; what lies behind the data has no meaning.
+    #[must_use]
+    #[inline]
+    pub fn first_8(&self) -> [u8; 8] {
+        self.data.first_chunk().copied().unwrap_or_default()
+    }
+
     /// The frame itself, as engines take it; `None` of FD frames and error reports.
     #[must_use]
     #[inline]
@@ -322,13 +329,6 @@ impl Buses {
             };
         }
         u16::try_from(self.last).ok().map(Bus)
-    }
-
-    /// The bus found last and its name.
-    #[inline]
-    pub(super) fn last(&self) -> Option<(Bus, &[u8])> {
-        let name = self.names.get(self.last)?;
-        Some((Bus(self.last as u16), name.as_bytes()))
     }
 
     pub(super) fn name(&self, bus: Bus) -> Option<&str> {

@@ -58,25 +58,63 @@ pub(super) fn hex_run(text: &[u8], out: &mut [u8]) -> Option<usize> {
         return None;
     }
     let mut bad = 0;
-    // The bytes of a classic frame are stored in one go: what is read together soon is written so.
-    if pairs.len() <= 8
-        && let Some(room) = out.first_chunk_mut::<8>()
-    {
-        let mut value = 0_u64;
-        for (at, &[high, low]) in pairs.iter().enumerate() {
-            let (high, low) = (nibble(high), nibble(low));
-            bad |= high | low;
-            value |= u64::from(high << 4 | low & 0x0F) << (8 * at);
-        }
-        *room = value.to_le_bytes();
-        return (bad <= 0x0F).then_some(pairs.len());
-    }
     for (&[high, low], byte) in pairs.iter().zip(out) {
         let (high, low) = (nibble(high), nibble(low));
         bad |= high | low;
         *byte = high << 4 | low & 0x0F;
     }
     (bad <= 0x0F).then_some(pairs.len())
+}
+
+/// How many of 16 characters from the first one on are hex digits, and the bytes of these digits with
+/// zeros behind them.
+#[inline(always)]
+pub(super) fn hex_of_16(text: &[u8; 16]) -> (usize, [u8; 8]) {
+    let [low, high] = text.as_chunks::<8>().0 else { return (0, [0; 8]) };
+    let (low_count, low) = hex_of_8(*low);
+    let (high_count, high) = hex_of_8(*high);
+    let count = if low_count == 8 { 8 + high_count } else { low_count };
+    let used = 1_u64.checked_shl(count / 2 * 8).map_or(u64::MAX, |bit| bit - 1);
+    (count as usize, ((low | high << 32) & used).to_le_bytes())
+}
+
+/// How many of 8 characters from the first one on are hex digits, and the bytes of these digits.
+#[inline(always)]
+fn hex_of_8(text: [u8; 8]) -> (u32, u64) {
+    const ONES: u64 = u64::from_le_bytes([1; 8]);
+    const TOP: u64 = 0x80 * ONES;
+    /// The top bit of each byte tells whether this byte of 7 bits is at least `least`.
+    const fn at_least(bytes: u64, least: u8) -> u64 {
+        bytes + (0x80 - least as u64) * ONES
+    }
+    let text = u64::from_le_bytes(text);
+    let low = text & !TOP;
+    let small = low | (0x20 * ONES);
+    let digits = at_least(low, b'0') & !at_least(low, b'9' + 1);
+    let letters = at_least(small, b'a') & !at_least(small, b'f' + 1);
+    let others = !((digits | letters) & !text) & TOP;
+    let nibbles = (text & (0x0F * ONES)) + 9 * ((text >> 6) & ONES);
+    // The first digit of a pair is the higher one; then the bytes of pairs move together.
+    let pairs = (nibbles << 4 | nibbles >> 8) & 0x00FF_00FF_00FF_00FF;
+    let pairs = (pairs | pairs >> 8) & 0x0000_FFFF_0000_FFFF;
+    (others.trailing_zeros() / 8, (pairs | pairs >> 16) & 0xFFFF_FFFF)
+}
+
+/// A number of 8 decimal digits.
+#[inline(always)]
+pub(super) fn decimal_of_8(text: [u8; 8]) -> Option<u32> {
+    const ONES: u64 = u64::from_le_bytes([1; 8]);
+    let text = u64::from_le_bytes(text);
+    // Digits are 30h to 39h: the upper half of a byte is 3, and still is with 6 more.
+    let upper = |bytes: u64| bytes & (0xF0 * ONES);
+    if upper(text) != 0x30 * ONES || upper(text.wrapping_add(6 * ONES)) != 0x30 * ONES {
+        return None;
+    }
+    // Pairs of digits, of pairs, of fours: the first one is the higher one and in the lower place.
+    let digits = text & (0x0F * ONES);
+    let pairs = (10 * digits + (digits >> 8)) & 0x00FF_00FF_00FF_00FF;
+    let fours = (100 * pairs + (pairs >> 16)) & 0x0000_FFFF_0000_FFFF;
+    Some((10_000 * (fours & 0xFFFF) + (fours >> 32)) as u32)
 }
 
 /// A decimal number.
@@ -190,6 +228,10 @@ mod tests {
         let mut out = [0; 2];
         assert_eq!((hex_run(b"1122", &mut out), out), (Some(2), [0x11, 0x22]));
         assert_eq!((hex_run(b"112", &mut out), hex_run(b"112233", &mut out)), (None, None));
+        assert_eq!(
+            (decimal_of_8(*b"00627243"), decimal_of_8(*b"99999999")),
+            (Some(627_243), Some(99_999_999))
+        );
         assert_eq!(fixed(b"1682489978.627243", 1_000_000_000), Some(1_682_489_978_627_243_000));
         assert_eq!(fixed(b"144.5", 1_000_000), Some(144_500_000));
         assert_eq!(
@@ -200,5 +242,29 @@ mod tests {
         assert_eq!(clock(b"01:02:03.5"), Some(3_723_500_000_000));
         assert_eq!(date_time(b"2015-07-10 08:57:32.249713"), Some(1_436_518_652_249_713_000));
         assert_eq!((date_time(b"2015-13-10 08:57:32"), date_time(b"")), (None, None));
+    }
+
+    /// Every byte at every place, among digits.
+    #[test]
+    fn eight_and_sixteen_at_once() {
+        for at in 0..16 {
+            for byte in 0..=255 {
+                let mut text = *b"0123456789abCDEF";
+                text[at] = byte;
+                let (count, bytes) = hex_of_16(&text);
+                let digits = text.iter().take_while(|digit| digit.is_ascii_hexdigit()).count();
+                let mut expected = [0; 8];
+                hex_run(&text[..digits / 2 * 2], &mut expected).unwrap();
+                assert_eq!((count, bytes), (digits, expected), "{byte} at {at}");
+            }
+        }
+        for at in 0..8 {
+            for byte in 0..=255 {
+                let mut text = *b"12345678";
+                text[at] = byte;
+                let expected = decimal(&text).map(|number| number as u32);
+                assert_eq!(decimal_of_8(text), expected, "{byte} at {at}");
+            }
+        }
     }
 }

@@ -249,7 +249,7 @@ const fn lss_response(response: &lss::Response) -> &'static str {
     }
 }
 
-/// The objects in a PDO whose mapping is known; whether there are any.
+/// The objects in a PDO whose mapping is known.
 pub(super) fn put_mapped(
     out: &mut Vec<u8>,
     names: &Names,
@@ -257,8 +257,8 @@ pub(super) fn put_mapped(
     tracer: &Tracer,
     bus: u16,
     data: &[u8],
-) -> bool {
-    let Kind::Pdo { node, .. } = *kind else { return false };
+) {
+    let Kind::Pdo { node, .. } = *kind else { return };
     let mut first = true;
     for field in tracer.mapped(bus, kind, data) {
         out.extend_from_slice(if first { b",\"mapped\":[{\"index\":" } else { b",{\"index\":" });
@@ -275,7 +275,6 @@ pub(super) fn put_mapped(
     if !first {
         out.push(b']');
     }
-    !first
 }
 
 fn put_state(out: &mut Vec<u8>, state: Option<State>) {

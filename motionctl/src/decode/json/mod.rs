@@ -3,6 +3,7 @@
 //! Written by hand and not through a tree of values: a capture has millions of them.
 
 mod fields;
+mod line;
 mod text;
 
 use std::io::{self, Write};
@@ -14,7 +15,8 @@ use super::hear::number_of;
 use super::names::Names;
 use super::{Teller, Totals, named};
 use fields::{put_mapped, put_tail};
-use text::{Piece, key, put_hex, put_number, put_text, put_time, put_word};
+use line::Line;
+use text::{Moment, key, put_hex, put_number, put_text, put_time, put_word};
 
 /// Writes JSON without blanks.
 pub(super) struct Json<'a> {
@@ -22,20 +24,8 @@ pub(super) struct Json<'a> {
     names: &'a Names,
     /// The last bus and how it is written.
     bus: (String, Vec<u8>),
-    /// By 11-bit identifier: what stands between the time and the data of plain data frames.
-    heads: Vec<Head>,
-    /// Whole seconds of the frame before, and how they are written.
-    seconds: (u64, Piece<24>),
-}
-
-/// The constant text around the data of one identifier on one bus.
-#[derive(Debug, Clone, Copy)]
-struct Head {
-    bus: u16,
-    known: bool,
-    text: Piece<96>,
-    /// What follows the data, while the frame is of the same kind.
-    tail: Option<(Kind, Piece<96>)>,
+    /// By 11-bit identifier: the last plain data frame.
+    lines: Vec<Option<Line>>,
 }
 
 impl<'a> Json<'a> {
@@ -44,65 +34,34 @@ impl<'a> Json<'a> {
             out: Vec::with_capacity(2 * super::BLOCK),
             names,
             bus: (String::new(), b"\"\"".to_vec()),
-            heads: vec![Head { bus: 0, known: false, text: Piece::EMPTY, tail: None }; 0x800],
-            seconds: (u64::MAX, Piece::EMPTY),
+            lines: vec![None; 0x800],
         }
     }
 
-    /// `{"t":…` with six decimals, the whole seconds from the frame before where they are the same.
-    #[inline]
-    fn put_start(&mut self, time: Option<Time>) {
-        let nanos = match time {
-            Some(Time(nanos)) if nanos >= 0 && nanos % 1000 == 0 => nanos as u64,
-            _ => {
-                self.out.extend_from_slice(b"{\"t\":");
-                return put_time(&mut self.out, time);
-            }
-        };
-        let seconds = nanos / 1_000_000_000;
-        if self.seconds.0 != seconds {
-            let text = format!("{{\"t\":{seconds}.");
-            self.seconds = (seconds, Piece::new(text.as_bytes()).unwrap_or(Piece::EMPTY));
-        }
-        self.seconds.1.put(&mut self.out);
-        let micros = (nanos % 1_000_000_000 / 1000) as u32;
-        let pair = |number: u32| {
-            let number = (number % 100) as u8;
-            [b'0' + number / 10, b'0' + number % 10]
-        };
-        self.out.extend_from_slice([pair(micros / 10_000), pair(micros / 100), pair(micros)].as_flattened());
-    }
-
-    /// What stands between time and data.
-    #[inline]
+    /// What stands before the data.
     fn put_head(&mut self, record: &Record, bus: Option<&str>) {
-        let frame = &record.frame;
-        let number = number_of(record);
-        let plain = !frame.extended && frame.kind == FrameKind::Data;
-        let at = frame.id as usize;
-        if plain
-            && let Some(head) = self.heads.get(at)
-            && head.known
-            && head.bus == number
-        {
-            return head.text.put(&mut self.out);
-        }
-        let from = self.out.len();
+        self.out.extend_from_slice(b"{\"t\":");
+        put_time(&mut self.out, record.time);
         key!(self.out, "bus");
         self.put_bus(bus);
         key!(self.out, "id");
-        put_number(&mut self.out, frame.id);
-        let remote = frame.kind == FrameKind::Remote;
-        self.out.extend_from_slice(match (frame.extended, remote) {
+        put_number(&mut self.out, record.frame.id);
+        let remote = record.frame.kind == FrameKind::Remote;
+        self.out.extend_from_slice(match (record.frame.extended, remote) {
             (false, false) => b",\"ext\":false,\"rtr\":false,\"data\":\"".as_slice(),
             (false, true) => b",\"ext\":false,\"rtr\":true,\"data\":\"",
             (true, false) => b",\"ext\":true,\"rtr\":false,\"data\":\"",
             (true, true) => b",\"ext\":true,\"rtr\":true,\"data\":\"",
         });
-        let text = self.out.get(from..).and_then(Piece::new);
-        if plain && let (Some(head), Some(text)) = (self.heads.get_mut(at), text) {
-            *head = Head { bus: number, known: true, text, tail: None };
-        }
+    }
+
+    /// The data and what follows it.
+    fn put_rest(&mut self, record: &Record, kind: &Kind, tracer: &Tracer) {
+        let out = &mut self.out;
+        put_hex(out, record.frame.data());
+        put_tail(out, record, kind);
+        put_mapped(out, self.names, kind, tracer, number_of(record), record.frame.data());
+        out.extend_from_slice(b"}\n");
     }
 
     fn put_bus(&mut self, bus: Option<&str>) {
@@ -127,28 +86,41 @@ impl Teller for Json<'_> {
         tracer: &Tracer,
     ) {
         let frame = &record.frame;
-        self.put_start(record.time);
-        self.put_head(record, bus);
-        let out = &mut self.out;
-        put_hex(out, frame.data());
+        let number = number_of(record);
         let plain = !frame.extended
             && frame.kind == FrameKind::Data
             && record.direction.is_none()
-            && !record.loopback
-            && matches!(kind, Kind::Pdo { .. } | Kind::Heartbeat { .. } | Kind::Unknown);
-        let head = self.heads.get_mut(frame.id as usize).filter(|_| plain);
-        if let Some(Head { tail: Some((same, tail)), .. }) = &head
-            && same == kind
-            && tracer.mapped(number_of(record), kind, frame.data()).next().is_none()
+            && !record.loopback;
+        let moment = record.time.filter(|_| plain).and_then(Moment::of);
+        let Some(moment) = moment else {
+            self.put_head(record, bus);
+            return self.put_rest(record, kind, tracer);
+        };
+        let line = self.lines.get(frame.id as usize).and_then(Option::as_ref);
+        let line = line.filter(|line| line.begins_like(number, moment));
+        // Only in these the data is told in words, too.
+        let constant =
+            !matches!(kind, Kind::Emcy { .. }) && tracer.mapped(number, kind, frame.data()).next().is_none();
+        if let Some(line) = line
+            && constant
+            && line.ends_like(frame, kind)
         {
-            return tail.put(out);
+            return line.put(&mut self.out, moment, frame.first_8());
         }
-        let from = out.len();
-        put_tail(out, record, kind);
-        let constant = !put_mapped(out, self.names, kind, tracer, number_of(record), frame.data());
-        out.extend_from_slice(b"}\n");
-        if let Some(head) = head.filter(|_| constant) {
-            head.tail = out.get(from..).and_then(Piece::new).map(|tail| (*kind, tail));
+        let from = self.out.len();
+        let known = line.is_some();
+        match line {
+            Some(line) => line.put_head(&mut self.out, moment),
+            None => self.put_head(record, bus),
+        }
+        let data_at = self.out.len() - from;
+        self.put_rest(record, kind, tracer);
+        // Of the others the next one mostly differs, and only its head is taken.
+        let stays = matches!(kind, Kind::Pdo { .. } | Kind::Heartbeat { .. } | Kind::Unknown);
+        if (!known || stays)
+            && let (Some(place), Some(text)) = (self.lines.get_mut(frame.id as usize), self.out.get(from..))
+        {
+            *place = Line::new(number, frame, kind, moment, text, data_at);
         }
     }
 
@@ -246,4 +218,109 @@ pub(super) fn summary(totals: &Totals, out: &mut impl Write) -> io::Result<()> {
         "by_kind": by_kind,
     });
     writeln!(out, "{summary}")
+}
+
+#[cfg(test)]
+mod tests {
+    use canopen_master::trace::Tracer;
+    use motion_io::capture::{Bus, Direction, Frame};
+
+    use super::*;
+    use crate::decode::{Ear, Totals};
+
+    /// Has every frame told twice: by one that remembers and by a new one.
+    struct Both<'a> {
+        remembers: Json<'a>,
+        frames: usize,
+    }
+
+    impl Both<'_> {
+        fn compare(&mut self, tell: impl Fn(&mut Json<'_>)) {
+            let mut fresh = Json::new(self.remembers.names);
+            tell(&mut fresh);
+            self.remembers.out.clear();
+            tell(&mut self.remembers);
+            assert_eq!(
+                String::from_utf8_lossy(&self.remembers.out),
+                String::from_utf8_lossy(&fresh.out),
+                "frame {}",
+                self.frames
+            );
+        }
+    }
+
+    impl Teller for Both<'_> {
+        fn frame(
+            &mut self,
+            record: &Record,
+            time: Option<Time>,
+            bus: Option<&str>,
+            kind: &Kind,
+            tracer: &Tracer,
+        ) {
+            self.frames += 1;
+            self.compare(|json| json.frame(record, time, bus, kind, tracer));
+        }
+
+        fn transfer(&mut self, transfer: &Transfer, given: Option<Time>, bus: Option<&str>) {
+            self.compare(|json| json.transfer(transfer, given, bus));
+        }
+
+        fn text(&mut self) -> &mut Vec<u8> {
+            &mut self.remembers.out
+        }
+    }
+
+    #[test]
+    fn what_is_remembered_of_an_identifier_changes_nothing() {
+        let mut seed = 1_u64;
+        let mut below = |limit: u64| {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (seed >> 33) % limit
+        };
+        let names = Names::default();
+        let mut both = Both { remembers: Json::new(&names), frames: 0 };
+        let mut ear = Ear::new(&names, false);
+        let mut totals = Totals::default();
+        let mut nanos = 1_682_489_978_000_000_000_i64;
+        for count in 0..40_000 {
+            // Mostly microseconds, that a second begins with other digits from time to time.
+            nanos += 1000 * below(if count % 100 == 0 { 2_000_000 } else { 400 }) as i64;
+            let id =
+                [0x80, 0x81, 0x181, 0x182, 0x201, 0x581, 0x601, 0x701, 0x702, 0x7E5, 0][below(11) as usize];
+            // A mapping is read, other requests, counting bytes.
+            let data: [u8; 8] = match below(4) {
+                0 => [0x40, 0, 0x1A, below(3) as u8, 0, 0, 0, 0],
+                1 => [0x4F, 0, 0x1A, 0, 1, 0, 0, 0],
+                2 => [0x43, 0, 0x1A, 1, 16, 0, 0x41, 0x60],
+                _ => (below(1 << 31) << 32 | below(1 << 31)).to_le_bytes(),
+            };
+            let len = if below(3) == 0 { below(9) as usize } else { 8 };
+            let (extended, kind) = match below(40) {
+                0 => (true, FrameKind::Data),
+                1 => (false, FrameKind::Remote),
+                2 => (false, FrameKind::Error),
+                3 => (false, FrameKind::Fd { bit_rate_switch: true, error_passive: false }),
+                _ => (false, FrameKind::Data),
+            };
+            let mut record = Record::new(Frame::new(id, extended, kind, &data[..len]).unwrap());
+            record.time = match below(40) {
+                0 => None,
+                1 => Some(Time(nanos + 1)),
+                2 => Some(Time(-nanos)),
+                _ => Some(Time(nanos)),
+            };
+            record.bus = (below(20) != 0).then_some(Bus(u16::from(below(20) == 0)));
+            record.direction = match below(20) {
+                0 => Some(Direction::Rx),
+                1 => Some(Direction::Tx),
+                _ => None,
+            };
+            record.loopback = below(20) == 0;
+            ear.hear(&record, &mut both, &mut totals);
+        }
+        ear.finish(&mut both);
+        assert_eq!(both.frames, 40_000);
+        assert!(totals.by_kind.iter().filter(|count| **count > 100).count() >= 8, "{:?}", totals.by_kind);
+    }
 }

@@ -1,5 +1,7 @@
 //! Numbers, times, bytes and texts as JSON.
 
+use std::io::Write as _;
+
 use motion_io::capture::Time;
 
 /// `"name":` with the comma before it.
@@ -9,31 +11,6 @@ macro_rules! key {
     };
 }
 pub(super) use key;
-
-/// A short piece of text that is copied in one go.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Piece<const N: usize> {
-    text: [u8; N],
-    len: usize,
-}
-
-impl<const N: usize> Piece<N> {
-    pub(super) const EMPTY: Self = Self { text: [0; N], len: 0 };
-
-    /// `None` where the text is longer.
-    pub(super) fn new(text: &[u8]) -> Option<Self> {
-        let mut piece = Self { len: text.len(), ..Self::EMPTY };
-        piece.text.get_mut(..text.len())?.copy_from_slice(text);
-        Some(piece)
-    }
-
-    #[inline]
-    pub(super) fn put(&self, out: &mut Vec<u8>) {
-        let end = out.len() + self.len;
-        out.extend_from_slice(&self.text);
-        out.truncate(end);
-    }
-}
 
 /// Eight digits of four bytes, the first byte lowest in both: one nibble goes to each byte of the
 /// result.
@@ -48,18 +25,20 @@ const fn hex_of_4(bytes: u32) -> u64 {
     nibbles + b'0' as u64 * ONES + letters * (b'A' - b'9' - 1) as u64
 }
 
+/// Sixteen digits of eight bytes.
 #[inline]
+pub(super) const fn hex_of_8(bytes: [u8; 8]) -> u128 {
+    let bytes = u64::from_le_bytes(bytes);
+    hex_of_4(bytes as u32) as u128 | (hex_of_4((bytes >> 32) as u32) as u128) << 64
+}
+
 pub(super) fn put_hex(out: &mut Vec<u8>, data: &[u8]) {
-    // The data of a classic frame in one go; of a longer one piece by piece.
-    for data in data.chunks(8) {
-        let bytes = match data.first_chunk() {
-            Some(bytes) => u64::from_le_bytes(*bytes),
-            None => data.iter().rev().fold(0, |bytes, &byte| bytes << 8 | u64::from(byte)),
-        };
-        let text = [hex_of_4(bytes as u32).to_le_bytes(), hex_of_4((bytes >> 32) as u32).to_le_bytes()];
-        let end = out.len() + 2 * data.len();
-        out.extend_from_slice(text.as_flattened());
-        out.truncate(end);
+    let (eights, rest) = data.as_chunks();
+    for &bytes in eights {
+        out.extend_from_slice(&hex_of_8(bytes).to_le_bytes());
+    }
+    for &byte in rest {
+        out.extend(hex_of_4(byte.into()).to_le_bytes().iter().take(2));
     }
 }
 
@@ -68,23 +47,56 @@ pub(super) fn put_number(out: &mut Vec<u8>, number: impl itoa::Integer) {
     out.extend_from_slice(itoa::Buffer::new().format(number).as_bytes());
 }
 
+/// Two digits each.
+const PAIRS: [[u8; 2]; 100] = {
+    let mut pairs = [[0; 2]; 100];
+    let mut number = 0;
+    while number < 100 {
+        pairs[number] = [b'0' + number as u8 / 10, b'0' + number as u8 % 10];
+        number += 1;
+    }
+    pairs
+};
+
+/// A time of whole microseconds, from zero on.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Moment {
+    pub(super) seconds: u64,
+    micros: u32,
+}
+
+impl Moment {
+    #[inline]
+    pub(super) fn of(time: Time) -> Option<Self> {
+        let nanos = u64::try_from(time.0).ok()?;
+        let micros = nanos / 1000;
+        let seconds = micros / 1_000_000;
+        (micros * 1000 == nanos).then_some(Self { seconds, micros: (micros - seconds * 1_000_000) as u32 })
+    }
+
+    /// The digits behind the point.
+    #[inline]
+    pub(super) fn decimals(self) -> [u8; 6] {
+        let pair = |number: u32| PAIRS.get((number % 100) as usize).copied().unwrap_or_default();
+        let ([a, b], [c, d], [e, f]) =
+            (pair(self.micros / 10_000), pair(self.micros / 100), pair(self.micros));
+        [a, b, c, d, e, f]
+    }
+}
+
 /// Seconds with six decimals, or nine where six would lose something.
 #[inline]
 pub(super) fn put_time(out: &mut Vec<u8>, time: Option<Time>) {
-    let Some(Time(nanos)) = time else { return out.extend_from_slice(b"null") };
-    if nanos < 0 {
-        out.push(b'-');
+    let Some(time) = time else { return out.extend_from_slice(b"null") };
+    match Moment::of(time) {
+        Some(moment) => {
+            put_number(out, moment.seconds);
+            out.push(b'.');
+            out.extend_from_slice(&moment.decimals());
+        }
+        // Writing to a vector does not fail.
+        None => _ = write!(out, "{time}"),
     }
-    let nanos = nanos.unsigned_abs();
-    put_number(out, nanos / 1_000_000_000);
-    let fraction = (nanos % 1_000_000_000) as u32;
-    let mut digits = [b'.', b'0', b'0', b'0', b'0', b'0', b'0', b'0', b'0', b'0'];
-    let (mut rest, count) = if fraction.is_multiple_of(1000) { (fraction / 1000, 6) } else { (fraction, 9) };
-    for digit in digits.iter_mut().take(count + 1).skip(1).rev() {
-        *digit = b'0' + (rest % 10) as u8;
-        rest /= 10;
-    }
-    out.extend_from_slice(digits.get(..=count).unwrap_or(&[]));
 }
 
 /// Any text, quoted.
