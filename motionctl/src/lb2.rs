@@ -17,8 +17,7 @@ pub(crate) fn run(out: &Output, global: &Global, command: &Lb2) -> Result<(), Ex
         Lb2::Identify { line } => identify(out, global, line),
         Lb2::Failures { line } => failures(out, global, line),
         Lb2::ClearFailures { line } => {
-            if global.dry_run {
-                out.plan("would delete all stored failures");
+            if out.only_plans(|| "would delete all stored failures".into()) {
                 return Ok(());
             }
             let count = connect(out, global, line)?.delete_failures()?;
@@ -47,8 +46,7 @@ pub(crate) fn run(out: &Output, global: &Global, command: &Lb2) -> Result<(), Ex
         }
         Lb2::EraseFlash { line, bank } => {
             let bank = checked_bank(Some(*bank), true)?;
-            if global.dry_run {
-                out.plan(&format!("would erase flash bank {bank}"));
+            if out.only_plans(|| format!("would erase flash bank {bank}")) {
                 return Ok(());
             }
             out.confirm(global.yes, &format!("Erase flash bank {bank}?"))?;
@@ -195,8 +193,7 @@ fn write(
         bytes.push(0xFF);
     }
     let plan = format!("{} bytes to {kind} bank {} from offset {offset}", bytes.len(), area.bank);
-    if global.dry_run {
-        out.plan(&format!("would write {plan}{}", if erase { ", after erasing it" } else { "" }));
+    if out.only_plans(|| format!("would write {plan}{}", if erase { ", after erasing it" } else { "" })) {
         return Ok(());
     }
     if area.flash {
@@ -243,8 +240,7 @@ fn raw(out: &Output, global: &Global, line: &Line, hex: &str) -> Result<(), Exit
         return Err(Exit::usage(format!("{} data bytes, a telegram carries at most {MAX_DATA}", data.len())));
     }
     let request = Request::Raw { function: *function, data };
-    if global.dry_run {
-        out.plan(&format!("would send function {function:02X}h with {} data bytes", data.len()));
+    if out.only_plans(|| format!("would send function {function:02X}h with {} data bytes", data.len())) {
         return Ok(());
     }
     // Known functions are answered in their own form, which a raw request does not expect.

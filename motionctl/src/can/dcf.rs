@@ -23,8 +23,7 @@ pub(crate) fn run(out: &Output, global: &Global, line: &CanLine, node: u8, file:
         check(out, &name, reading, node)?;
     }
     let total = entries.len();
-    if global.dry_run {
-        out.plan(&format!("would write {total} objects to node {node}"));
+    if out.only_plans(|| format!("would write {total} objects to node {node}")) {
         return Ok(());
     }
     let id = node_id(node)?;

@@ -184,8 +184,7 @@ fn set(
     };
     let setting = Setting { role: Role::Transmit(trigger), ..Setting::OFF };
     let limit = run.limit.unwrap_or(default);
-    if global.dry_run {
-        out.plan(&format!("would send {} on channel {channel}", hex(data)));
+    if out.only_plans(|| format!("would send {} on channel {channel}", hex(data))) {
         return Ok(());
     }
     let mut device = Device::open(global, line, None, Some((channel, setting)))?;

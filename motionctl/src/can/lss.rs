@@ -64,8 +64,7 @@ fn carry_out(out: &Output, global: &Global, command: &Lss) -> Result<(), Exit> {
         }
         Lss::SetNode { node, target } => {
             let wanted = if *node == NO_NODE { None } else { Some(node_id(*node)?) };
-            if global.dry_run {
-                out.plan(&format!("would give the device node ID {node}"));
+            if out.only_plans(|| format!("would give the device node ID {node}")) {
                 return Ok(());
             }
             let (mut session, outcome) = with_target(global, target, Operation::ConfigureNodeId(wanted))?;
@@ -80,8 +79,7 @@ fn carry_out(out: &Output, global: &Global, command: &Lss) -> Result<(), Exit> {
             let rate = BitTiming::from_kbits(*kbits).ok_or_else(|| {
                 Exit::usage(format!("{kbits}: 1000, 800, 500, 250, 125, 50, 20 or 10 kbit/s expected"))
             })?;
-            if global.dry_run {
-                out.plan(&format!("would give the device {kbits} kbit/s"));
+            if out.only_plans(|| format!("would give the device {kbits} kbit/s")) {
                 return Ok(());
             }
             let (_, outcome) = with_target(global, target, Operation::ConfigureBitTiming(rate))?;
@@ -91,8 +89,7 @@ fn carry_out(out: &Output, global: &Global, command: &Lss) -> Result<(), Exit> {
             Ok(())
         }
         Lss::Store { target } => {
-            if global.dry_run {
-                out.plan("would let the device keep node ID and bit rate");
+            if out.only_plans(|| "would let the device keep node ID and bit rate".into()) {
                 return Ok(());
             }
             let (mut session, outcome) = with_target(global, target, Operation::Store)?;

@@ -149,8 +149,7 @@ pub(crate) fn nmt(
             Target::Node(node_id(raw)?)
         }
     };
-    if global.dry_run {
-        out.plan(&format!("would send {command} to {node}"));
+    if out.only_plans(|| format!("would send {command} to {node}")) {
         return Ok(());
     }
     let mut session = Session::open(global, line)?;

@@ -57,9 +57,8 @@ pub(crate) fn run(out: &Output, global: &Global, command: &Sdo) -> Result<(), Ex
                 }
                 (None, None) => return Err(Exit::usage("a value or --file expected")),
             };
-            if global.dry_run {
-                let bytes = counted(data.len(), "byte", "bytes");
-                out.plan(&format!("would write {bytes} to {at} of node {}", object.node));
+            let bytes = counted(data.len(), "byte", "bytes");
+            if out.only_plans(|| format!("would write {bytes} to {at} of node {}", object.node)) {
                 return Ok(());
             }
             let mut session = Session::open(global, &object.line)?;
@@ -77,7 +76,6 @@ pub(crate) fn run(out: &Output, global: &Global, command: &Sdo) -> Result<(), Ex
                 "data": shown,
             });
             out.document(document, || {
-                let bytes = counted(size, "byte", "bytes");
                 out.say(&format!("{bytes} written to {at} of node {}", object.node));
             });
             Ok(())

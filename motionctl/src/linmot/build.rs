@@ -11,7 +11,6 @@ use serde_json::json;
 
 use super::cli::{Build, Kind, ProfileName, Quantity};
 use super::curve;
-use crate::cli::Global;
 use crate::exit::Exit;
 use crate::output::{Output, counted};
 
@@ -32,7 +31,7 @@ struct Built {
     fastest: Option<f64>,
 }
 
-pub(super) fn run(out: &Output, global: &Global, arguments: &Build) -> Result<(), Exit> {
+pub(super) fn run(out: &Output, arguments: &Build) -> Result<(), Exit> {
     let Built { length, cam, setpoints, fastest } = built(arguments)?;
     let build = if cam { InfoBlock::cam } else { InfoBlock::position_over_time };
     let mut info = build(ANY_ID, "", length, arguments.setpoints).map_err(refused)?;
@@ -46,8 +45,7 @@ pub(super) fn run(out: &Output, global: &Global, arguments: &Build) -> Result<()
     let speed = fastest.map_or(String::new(), |speed| format!(", up to {speed:.4} m/s"));
     let text = curve::describe(&info);
     let text = text.trim_start().trim_start_matches(|c: char| c.is_ascii_digit()).trim_start();
-    if global.dry_run {
-        out.plan(&format!("would write {text}{speed} to {file}"));
+    if out.only_plans(|| format!("would write {text}{speed} to {file}")) {
         return Ok(());
     }
     curve::save(&arguments.output, &info, &setpoints)?;

@@ -28,12 +28,11 @@ pub(super) fn run(out: &Output, global: &Global, command: &Command) -> Result<()
         Command::Plot { drive, id, output } => {
             take(out, global, drive, *id, output, |info, setpoints| plot(output, info, setpoints))
         }
-        Command::Build(arguments) => build::run(out, global, arguments),
+        Command::Build(arguments) => build::run(out, arguments),
         Command::Add { drive, id, file } => write(out, global, drive, Access::Add, *id, file),
         Command::Modify { drive, id, file } => write(out, global, drive, Access::Modify, *id, file),
         Command::Save { drive } => {
-            if global.dry_run {
-                out.plan("would save all curves to flash");
+            if out.only_plans(|| "would save all curves to flash".into()) {
                 return Ok(());
             }
             out.confirm(global.yes, "Stop the MC software and write all curves to flash?")?;
@@ -43,8 +42,7 @@ pub(super) fn run(out: &Output, global: &Global, command: &Command) -> Result<()
             Ok(())
         }
         Command::DeleteAll { drive } => {
-            if global.dry_run {
-                out.plan("would delete all curves in RAM");
+            if out.only_plans(|| "would delete all curves in RAM".into()) {
                 return Ok(());
             }
             out.confirm_on_terminal(global.yes, "Delete all curves in RAM?")?;
@@ -101,8 +99,7 @@ fn take(
 ) -> Result<(), Exit> {
     let id = usable(id)?;
     let file = file.display();
-    if global.dry_run {
-        out.plan(&format!("would read curve {id} and write it to {file}"));
+    if out.only_plans(|| format!("would read curve {id} and write it to {file}")) {
         return Ok(());
     }
     let (info, setpoints) = read(out, &mut connect(global, drive)?, id)?;
@@ -156,8 +153,7 @@ fn write(
     file: &Path,
 ) -> Result<(), Exit> {
     let (info, setpoints) = load(file, usable(id)?)?;
-    if global.dry_run {
-        out.plan(&format!("would write {}", describe(&info)));
+    if out.only_plans(|| format!("would write {}", describe(&info))) {
         return Ok(());
     }
     let mut link = connect(global, drive)?;

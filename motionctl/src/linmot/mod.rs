@@ -69,8 +69,7 @@ fn errors(out: &Output, global: &Global, drive: &Drive) -> Result<(), Exit> {
 }
 
 fn restart(out: &Output, global: &Global, drive: &Drive, wait: bool) -> Result<(), Exit> {
-    if global.dry_run {
-        out.plan("would restart the drive");
+    if out.only_plans(|| "would restart the drive".into()) {
         return Ok(());
     }
     out.confirm_on_terminal(global.yes, "Restart the drive? Its motion stops.")?;

@@ -267,8 +267,7 @@ fn set(
         Wanted::Text(bytes) => format!("{:?}", text(bytes)),
         Wanted::Number(raw, range) => range.number(*raw).to_string(),
     };
-    if global.dry_run {
-        out.plan(&format!("would write {said} to {upid} in {name}"));
+    if out.only_plans(|| format!("would write {said} to {upid} in {name}")) {
         return Ok(());
     }
     out.confirm_on_terminal(global.yes, &format!("Write {said} to {upid} in {name}?"))?;
@@ -392,8 +391,7 @@ fn defaults(out: &Output, global: &Global, drive: &Drive, layers: &[LayerName]) 
     });
     let layers: Vec<Layer> = layers.collect();
     let names: Vec<&str> = layers.iter().map(|layer| layer.name()).collect();
-    if global.dry_run {
-        out.plan(&format!("would set the ROM values of {} to their defaults", names.join(", ")));
+    if out.only_plans(|| format!("would set the ROM values of {} to their defaults", names.join(", "))) {
         return Ok(());
     }
     out.confirm(global.yes, &format!("Set the ROM values of {} to their defaults?", names.join(", ")))?;

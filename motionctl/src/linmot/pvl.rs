@@ -79,8 +79,7 @@ fn backup(
     encoding: Encoding,
 ) -> Result<(), Exit> {
     let name = path.display().to_string();
-    if global.dry_run {
-        out.plan(&format!("would write ROM values and curves to {name}"));
+    if out.only_plans(|| format!("would write ROM values and curves to {name}")) {
         return Ok(());
     }
     let mut link = connect(global, drive)?;

@@ -30,8 +30,7 @@ pub(super) fn run(out: &Output, global: &Global, command: &Table) -> Result<(), 
         }
         Table::Set { drive, entry, raw } => set(out, global, drive, *entry, raw),
         Table::Delete { drive, entry } => {
-            if global.dry_run {
-                out.plan(&format!("would delete entry {entry} in RAM"));
+            if out.only_plans(|| format!("would delete entry {entry} in RAM")) {
                 return Ok(());
             }
             connect(global, drive)?.ask(Request::DeleteEntry { entry: *entry })?;
@@ -39,8 +38,7 @@ pub(super) fn run(out: &Output, global: &Global, command: &Table) -> Result<(), 
             Ok(())
         }
         Table::DeleteAll { drive } => {
-            if global.dry_run {
-                out.plan("would delete all entries in RAM");
+            if out.only_plans(|| "would delete all entries in RAM".into()) {
                 return Ok(());
             }
             out.confirm_on_terminal(global.yes, "Delete all command table entries in RAM?")?;
@@ -49,8 +47,7 @@ pub(super) fn run(out: &Output, global: &Global, command: &Table) -> Result<(), 
             Ok(())
         }
         Table::Save { drive } => {
-            if global.dry_run {
-                out.plan("would save the command table to flash");
+            if out.only_plans(|| "would save the command table to flash".into()) {
                 return Ok(());
             }
             out.confirm(global.yes, "Stop the MC software and write the command table to flash?")?;
@@ -107,8 +104,7 @@ fn show(out: &Output, entries: &Entries) {
 
 fn set(out: &Output, global: &Global, drive: &Drive, number: u16, raw: &str) -> Result<(), Exit> {
     let entry = parse(raw).map_err(|error| Exit::usage(format!("--raw: {error}")))?;
-    if global.dry_run {
-        out.plan(&format!("would write entry {number} in RAM"));
+    if out.only_plans(|| format!("would write entry {number} in RAM")) {
         return Ok(());
     }
     let mut link = connect(global, drive)?;
@@ -183,8 +179,7 @@ fn backup(out: &Output, global: &Global, drive: &Drive, path: &Path) -> Result<(
     let entries = read(out, &mut connect(global, drive)?)?;
     let name = path.display().to_string();
     remark_missing(out, &entries);
-    if global.dry_run {
-        out.plan(&format!("would write {} to {name}", entries_of(&entries)));
+    if out.only_plans(|| format!("would write {} to {name}", entries_of(&entries))) {
         return Ok(());
     }
     table_file::save(path, &entries)?;

@@ -205,13 +205,8 @@ fn backup(
     let mut client = connect(out, global, line)?;
     let identity = Identity::read(&mut client)?;
     let entries: Vec<Entry> = iter().collect();
-    if global.dry_run {
-        out.plan(&format!(
-            "would back up {} parameters of a GEL {} to {}",
-            entries.len(),
-            identity.model,
-            path.display()
-        ));
+    let (count, model, path_name) = (entries.len(), identity.model, path.display());
+    if out.only_plans(|| format!("would back up {count} parameters of a GEL {model} to {path_name}")) {
         return Ok(());
     }
     let values = read(out, &mut client, &entries)?;
