@@ -136,6 +136,24 @@ fn the_position_is_extrapolated_between_two_syncs() {
     }
 }
 
+/// Also while it accelerates: with the speed alone each actual value would bring a jump of 3,125 increments.
+#[test]
+fn an_accelerating_drive_is_extrapolated_without_jumps() {
+    let mut rig = Rig::new(Faults::NONE);
+    rig.run(Duration::from_secs(2));
+    rig.wanted.enable = true;
+    rig.run(Duration::from_millis(200));
+    let (mut last, mut step) = (rig.cycle().unwrap(), 0);
+    for cycle in 0..400 {
+        // 500,000 · 125 increments/s²: in 2 ms the way of a cycle grows by 250.
+        rig.wanted.speed += 1000;
+        let position = rig.cycle().unwrap();
+        let way = i64::from(position.wrapping_sub(last) & 0xFF_FFFF);
+        assert!(cycle < 50 || (way - step - 250).abs() < 1000, "cycle {cycle}: {step}, then {way}");
+        (last, step) = (position, way);
+    }
+}
+
 #[test]
 fn an_unplugged_drive_is_lost_once_and_comes_back() {
     let mut rig = Rig::new(Faults::NONE);

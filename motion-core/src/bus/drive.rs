@@ -15,6 +15,9 @@ const INCREMENTS: i64 = 125;
 /// Without an actual value for so long, it is no longer extrapolated: three SYNC periods.
 const STALE: Duration = Duration::from_millis(30);
 
+/// Actual values closer together than that tell nothing of an acceleration: they came late, or twice.
+const CLOSE: Duration = Duration::from_millis(5);
+
 /// What is known of a drive and wanted of it.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Drive {
@@ -23,6 +26,8 @@ pub(super) struct Drive {
     /// What the axis wanted last.
     wanted: bool,
     feedback: Option<(Duration, Feedback)>,
+    /// By how much its speed changes in a second, as the last two actual values tell.
+    acceleration: i64,
     /// Guarding has lost it, or the bus is away.
     lost: bool,
     /// It is in another operating mode than digital speed.
@@ -41,6 +46,13 @@ impl Drive {
     /// Takes an actual value.
     pub(super) fn receive(&mut self, now: Duration, data: Payload) {
         let Some(feedback) = Feedback::parse(data) else { return };
+        self.acceleration = match self.feedback {
+            Some((before, old)) if (CLOSE..=STALE).contains(&now.saturating_sub(before)) => {
+                let change = i64::from(feedback.speed) - i64::from(old.speed);
+                change * 1_000_000 / (now - before).as_micros() as i64
+            }
+            _ => 0,
+        };
         self.feedback = Some((now, feedback));
         let status = StatusWord(feedback.status_word);
         self.control.handle_status(now, status);
@@ -65,14 +77,15 @@ impl Drive {
     }
 
     /// The position now, 24 bits: SYNC is slower than the control cycle, so between two actual values it
-    /// is extrapolated with the drive's own speed (project-defined).
+    /// is extrapolated with the drive's own speed and its change (project-defined).
     pub(super) fn position(&self, now: Duration) -> Option<u32> {
         let (at, feedback) = self.feedback?;
         let age = now.saturating_sub(at);
         let age = if age > STALE || self.lost { Duration::ZERO } else { age };
         // At most 30 ms.
         let micros = age.as_micros() as i64;
-        let moved = i64::from(feedback.speed) * INCREMENTS * micros / 1_000_000;
+        let mean_speed = i64::from(feedback.speed) + self.acceleration * micros / 2_000_000;
+        let moved = mean_speed * INCREMENTS * micros / 1_000_000;
         Some(feedback.position.wrapping_add(moved as u32) & 0xFF_FFFF)
     }
 
