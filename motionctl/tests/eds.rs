@@ -61,7 +61,7 @@ fn show_resolves_the_node_id() {
     assert_eq!(objects.len(), 2);
     assert_eq!(objects[0]["entries"][0]["data_type"], "UNSIGNED16");
     assert_eq!(objects[1]["entries"][0]["data"], "85010000");
-    bench.run(&["eds", "show", "a.eds", "0x2000"]).ends(1).says("0x2000 is not in a.eds");
+    bench.run(&["eds", "show", "a.eds", "0x2000"]).ends(2).says("0x2000 is not in a.eds");
     bench.run(&["eds", "show", "a.eds", "Herzschlag"]).ends(2);
 }
 
@@ -132,6 +132,21 @@ fn a_description_stays_as_it_is_and_takes_no_values() {
     }
 }
 
+#[test]
+fn a_configuration_without_values_and_one_that_no_device_takes_are_told() {
+    let bench = bench();
+    bench
+        .run(&["eds", "convert", "a.eds", "a.bin", "--node", "5"])
+        .ends(0)
+        .says("a.eds configures nothing")
+        .says("0 values, 4 bytes");
+    bench
+        .run(&["eds", "convert", "a.eds", "b.bin", "--node", "5", "--set", "0x1000=3"])
+        .ends(0)
+        .says("0x1000 cannot be written")
+        .says("0 values");
+}
+
 /// A PDO of which the COB-ID depends on the node ID cannot be taken out of service without it.
 #[test]
 fn a_mapping_needs_the_node_id_for_a_concise_dcf() {
@@ -141,12 +156,12 @@ fn a_mapping_needs_the_node_id_for_a_concise_dcf() {
     std::fs::write(bench.path("a.dcf"), format!("{EDS}{more}")).unwrap();
     bench
         .run(&["eds", "convert", "a.dcf", "a.bin"])
-        .ends(1)
+        .ends(2)
         .says("1800h:01: depends on the node ID: give it by --node N");
     assert!(!bench.path("a.bin").exists());
-    bench.run(&["eds", "convert", "a.dcf", "a.bin", "--node", "5"]).ends(0);
+    bench.run(&["eds", "convert", "a.dcf", "a.bin", "--node", "5"]).ends(0).says("5 values, 53 bytes");
     let concise = std::fs::read(bench.path("a.bin")).unwrap();
-    assert_eq!(concise[..15], [4, 0, 0, 0, 0x00, 0x18, 1, 4, 0, 0, 0, 0x85, 1, 0, 0x80]);
+    assert_eq!(concise[..15], [5, 0, 0, 0, 0x00, 0x18, 1, 4, 0, 0, 0, 0x85, 1, 0, 0x80]);
 }
 
 /// An EDS has no word for `noAccess`: what gets lost is said.

@@ -134,8 +134,9 @@ pub fn encode_concise(entries: &[ConciseEntry]) -> Vec<u8> {
 const INVALID: u32 = 1 << 31;
 
 impl Device {
-    /// What is to be written to bring a device from its defaults to this configuration: every
-    /// `ParameterValue` that may be written and differs from the default.
+    /// What is to be written to bring a device to this configuration, whatever it holds: every
+    /// `ParameterValue` that may be written, and the whole mapping of a PDO of which a part is configured.
+    /// "Save" and "load" (1010h, 1011h) are orders, and not written where they are their defaults.
     ///
     /// In ascending order, except PDOs, which are taken out of service while their mapping changes, as
     /// CiA 301, 7.5.2.36 asks: COB-ID invalid, communication parameters, number of mapped objects 0,
@@ -147,37 +148,74 @@ impl Device {
         let node_id = node_id.or_else(|| self.node_id());
         let mut changes: BTreeMap<(u16, u8), Vec<u8>> = BTreeMap::new();
         for object in &self.objects {
-            for entry in object
-                .entries()
-                .iter()
-                .filter(|entry| entry.access.is_some_and(super::types::Access::can_write))
-            {
+            for entry in object.entries().iter().filter(|entry| can_write(entry)) {
                 let Some(value) = entry.value_bytes(node_id) else { continue };
                 let at = (object.index, entry.subindex);
                 let value =
                     value.map_err(|error| ConciseValueError { index: at.0, subindex: at.1, error })?;
-                if entry.default_bytes(node_id) != Some(Ok(value.clone())) {
+                let order = matches!(object.index, 0x1010 | 0x1011);
+                if !order || entry.default_bytes(node_id) != Some(Ok(value.clone())) {
                     changes.insert(at, value);
                 }
             }
         }
+        let mut mappings: Vec<u16> = changes.keys().map(|(index, _)| *index).collect();
+        mappings.retain(|index| matches!(index, 0x1600..=0x17FF | 0x1A00..=0x1BFF));
+        mappings.dedup();
+        for index in mappings {
+            self.complete_mapping(index, node_id, &mut changes)?;
+        }
         let mut entries = Vec::new();
         while let Some(((index, subindex), data)) = changes.pop_first() {
             let pdo = match index {
-                0x1400..=0x15FF | 0x1800..=0x19FF => Some(index),
-                0x1600..=0x17FF | 0x1A00..=0x1BFF => Some(index - 0x200),
-                _ => None,
-            };
-            let cob_id = pdo.map(|pdo| self.cob_id(pdo, node_id)).transpose()?.flatten();
-            match (pdo, cob_id) {
-                (Some(pdo), Some(cob_id)) => {
-                    changes.insert((index, subindex), data);
-                    take_pdo(pdo, cob_id, &mut changes, &mut entries);
+                0x1400..=0x15FF | 0x1800..=0x19FF => index,
+                0x1600..=0x17FF | 0x1A00..=0x1BFF => index - 0x200,
+                _ => {
+                    entries.push(ConciseEntry { index, subindex, data });
+                    continue;
                 }
-                _ => entries.push(ConciseEntry { index, subindex, data }),
-            }
+            };
+            changes.insert((index, subindex), data);
+            take_pdo(pdo, self.cob_id(pdo, node_id)?, &mut changes, &mut entries);
         }
         Ok(entries)
+    }
+
+    /// Adds what belongs to a mapping of which a part changes: it is written as a whole, with its number
+    /// of objects last.
+    fn complete_mapping(
+        &self,
+        index: u16,
+        node_id: Option<u8>,
+        changes: &mut BTreeMap<(u16, u8), Vec<u8>>,
+    ) -> Result<(), ConciseValueError> {
+        let highest = changes.range((index, 0)..=(index, u8::MAX)).next_back().map_or(0, |(at, _)| at.1);
+        let number = match self.entry(index, 0) {
+            Some(entry) if !can_write(entry) => return Ok(()),
+            Some(entry) => self.in_the_end(index, entry, node_id)?,
+            None => None,
+        };
+        let number = number.unwrap_or_else(|| [highest].into());
+        for subindex in 1..=number.first().copied().unwrap_or(0) {
+            if let Some(entry) = self.entry(index, subindex).filter(|entry| can_write(entry))
+                && let Some(mapped) = self.in_the_end(index, entry, node_id)?
+            {
+                changes.entry((index, subindex)).or_insert(mapped);
+            }
+        }
+        changes.entry((index, 0)).or_insert(number);
+        Ok(())
+    }
+
+    /// What an entry shall hold in the end: its value, otherwise its default.
+    fn in_the_end(
+        &self,
+        index: u16,
+        entry: &Entry,
+        node_id: Option<u8>,
+    ) -> Result<Option<Vec<u8>>, ConciseValueError> {
+        let value = entry.value_bytes(node_id).or_else(|| entry.default_bytes(node_id)).transpose();
+        value.map_err(|error| ConciseValueError { index, subindex: entry.subindex, error })
     }
 
     /// Takes the values of a concise DCF as `ParameterValue`s. Gives the entries that the device does
@@ -204,15 +242,14 @@ impl Device {
     /// COB-ID that a PDO shall have in the end, from value or default; `None` where it cannot be written or
     /// the file does not say it.
     fn cob_id(&self, pdo: u16, node_id: Option<u8>) -> Result<Option<u32>, ConciseValueError> {
-        let writable = |entry: &&Entry| entry.access.is_some_and(super::types::Access::can_write);
-        let value = self
-            .entry(pdo, 1)
-            .filter(writable)
-            .and_then(|entry| entry.value_bytes(node_id).or_else(|| entry.default_bytes(node_id)));
-        let bytes =
-            value.transpose().map_err(|error| ConciseValueError { index: pdo, subindex: 1, error })?;
+        let Some(entry) = self.entry(pdo, 1).filter(|entry| can_write(entry)) else { return Ok(None) };
+        let bytes = self.in_the_end(pdo, entry, node_id)?;
         Ok(bytes.and_then(|bytes| Some(u32::from_le_bytes(bytes.try_into().ok()?))))
     }
+}
+
+fn can_write(entry: &Entry) -> bool {
+    entry.access.is_some_and(super::types::Access::can_write)
 }
 
 /// The text of which a file gives exactly these bytes back; a text file has no zero bytes.
@@ -225,7 +262,7 @@ fn text_of(bytes: &[u8], data_type: DataType) -> Option<String> {
 /// Moves the changes of one PDO in the order that its mapping needs.
 fn take_pdo(
     pdo: u16,
-    cob_id: u32,
+    cob_id: Option<u32>,
     changes: &mut BTreeMap<(u16, u8), Vec<u8>>,
     entries: &mut Vec<ConciseEntry>,
 ) {
@@ -235,19 +272,23 @@ fn take_pdo(
         let keys: Vec<_> = changes.range((index, 0)..=(index, u8::MAX)).map(|(key, _)| *key).collect();
         keys.into_iter().filter_map(|key| Some((key.1, changes.remove(&key)?))).collect()
     };
-    push(pdo, 1, (cob_id | INVALID).to_le_bytes().to_vec());
+    if let Some(cob_id) = cob_id {
+        push(pdo, 1, (cob_id | INVALID).to_le_bytes().to_vec());
+    }
     for (subindex, data) in of(pdo, changes).into_iter().filter(|(subindex, _)| *subindex != 1) {
         push(pdo, subindex, data);
     }
-    let mapped = of(mapping, changes);
-    if !mapped.is_empty() {
+    let (number, objects): (Vec<_>, Vec<_>) =
+        of(mapping, changes).into_iter().partition(|(subindex, _)| *subindex == 0);
+    if !number.is_empty() {
         push(mapping, 0, [0].to_vec());
-        let (count, objects): (Vec<_>, Vec<_>) = mapped.into_iter().partition(|(subindex, _)| *subindex == 0);
-        for (subindex, data) in objects.into_iter().chain(count) {
-            push(mapping, subindex, data);
-        }
     }
-    push(pdo, 1, cob_id.to_le_bytes().to_vec());
+    for (subindex, data) in objects.into_iter().chain(number) {
+        push(mapping, subindex, data);
+    }
+    if let Some(cob_id) = cob_id {
+        push(pdo, 1, cob_id.to_le_bytes().to_vec());
+    }
 }
 
 #[cfg(test)]
@@ -281,10 +322,12 @@ mod tests {
                 "1A00:1 [10, 00, 41, 60]",
                 "1A00:0 [01]",
                 "1800:1 [85, 01, 00, 00]",
+                // A device may hold anything: also what is the default is written.
+                "6000:0 [10]",
             ]
         );
         let bytes = encode_concise(&entries);
-        assert_eq!(bytes[..13], [7, 0, 0, 0, 0x17, 0x10, 0, 2, 0, 0, 0, 0xE8, 3]);
+        assert_eq!(bytes[..13], [8, 0, 0, 0, 0x17, 0x10, 0, 2, 0, 0, 0, 0xE8, 3]);
         assert_eq!(parse_concise(&bytes), Ok(entries.clone()));
 
         let mut other = device.clone();
@@ -296,6 +339,49 @@ mod tests {
         assert_eq!(other.to_concise(Some(5)).unwrap(), entries);
     }
 
+    fn written(device: &Device) -> Vec<String> {
+        let entries = device.to_concise(Some(5)).unwrap();
+        entries.iter().map(|e| format!("{:04X}:{} {:02X?}", e.index, e.subindex, e.data)).collect()
+    }
+
+    /// With one of its objects configured, and the rest of it as the device has it, a PDO would be left
+    /// with any mapping, or none.
+    #[test]
+    fn a_mapping_is_written_as_a_whole() {
+        let text = "[1800]\nParameterName=T\nObjectType=9\nSubNumber=2\n[1800sub1]\nParameterName=COB\nDataType=7\n\
+            AccessType=rw\nDefaultValue=$NODEID+0x180\n\
+            [1A00]\nParameterName=M\nObjectType=9\nSubNumber=4\n[1A00sub0]\nParameterName=N\nDataType=5\nAccessType=rw\n\
+            DefaultValue=2\n[1A00sub1]\nParameterName=A\nDataType=7\nAccessType=rw\nDefaultValue=0x60410010\n\
+            [1A00sub2]\nParameterName=B\nDataType=7\nAccessType=rw\nDefaultValue=0x60640020\nParameterValue=0x60610008\n\
+            [1A00sub3]\nParameterName=C\nDataType=7\nAccessType=rw\nDefaultValue=0x606C0020\n";
+        let device = read(text.as_bytes()).unwrap().device;
+        let whole = [
+            "1800:1 [85, 01, 00, 80]",
+            "1A00:0 [00]",
+            "1A00:1 [10, 00, 41, 60]",
+            "1A00:2 [08, 00, 61, 60]",
+            "1A00:0 [02]",
+            "1800:1 [85, 01, 00, 00]",
+        ];
+        assert_eq!(written(&device), whole);
+        // A number that the file does not say is that of the objects that it configures.
+        let silent = read(text.replace("DefaultValue=2\n", "").as_bytes()).unwrap().device;
+        assert_eq!(written(&silent), whole);
+        // One that cannot be written is left alone, and so is the identifier.
+        let fixed = text.replacen("AccessType=rw\nDefaultValue=$", "AccessType=ro\nDefaultValue=$", 1);
+        let fixed = read(fixed.replace("DataType=5\nAccessType=rw", "DataType=5\nAccessType=ro").as_bytes());
+        assert_eq!(written(&fixed.unwrap().device), ["1A00:2 [08, 00, 61, 60]"]);
+    }
+
+    #[test]
+    fn orders_that_are_defaults_are_not_given() {
+        let text = "[1011]\nParameterName=L\nObjectType=9\nSubNumber=2\n[1011sub1]\nParameterName=all\nDataType=7\n\
+            AccessType=rw\nDefaultValue=1\nParameterValue=1\n";
+        assert_eq!(written(&read(text.as_bytes()).unwrap().device), [""; 0]);
+        let order = text.replace("ParameterValue=1", "ParameterValue=0x64616F6C");
+        assert_eq!(written(&read(order.as_bytes()).unwrap().device), ["1011:1 [6C, 6F, 61, 64]"]);
+    }
+
     /// Written while the PDO is in service, a mapping is refused, or changes what moves meanwhile.
     #[test]
     fn a_mapping_is_not_written_while_the_cob_id_is_unknown() {
@@ -303,7 +389,7 @@ mod tests {
         let device = read(text.as_bytes()).unwrap().device;
         let error = ConciseValueError { index: 0x1800, subindex: 1, error: ValueError::NeedsNodeId };
         assert_eq!(device.to_concise(None), Err(error));
-        assert_eq!(device.to_concise(Some(5)).unwrap().len(), 7);
+        assert_eq!(device.to_concise(Some(5)).unwrap().len(), 8);
     }
 
     #[test]

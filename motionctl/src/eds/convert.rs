@@ -8,7 +8,7 @@ use serde_json::json;
 use super::cli::{Input, Kind};
 use super::{bytes, place, read};
 use crate::exit::Exit;
-use crate::output::Output;
+use crate::output::{Output, counted};
 
 pub(super) struct Changes<'a> {
     pub(super) node: Option<u8>,
@@ -58,7 +58,13 @@ pub(super) fn run(
             unconfigure(out, &mut device);
         }
     }
-    let (written, lost) = render(&reading, &device, kind, changes)?;
+    let Rendered { written, lost, values } = render(&reading, &device, kind, changes)?;
+    if values == Some(0) {
+        out.remark(format!(
+            "{} configures nothing: no value in it that may be written",
+            input.file.display()
+        ));
+    }
     for what in &lost {
         out.remark(format!("not carried over: {what}"));
     }
@@ -74,11 +80,17 @@ pub(super) fn run(
     }
     let document = json!({
         "file": input.file.display().to_string(), "output": name, "objects": objects, "entries": entries,
-        "bytes": written.len(), "lost": lost, "written": !dry_run,
+        "values": values, "bytes": written.len(), "lost": lost, "written": !dry_run,
     });
     out.document(document, || {
         let verb = if dry_run { "would write" } else { "written" };
-        println!("{name}: {verb}, {objects} objects, {entries} entries, {} bytes", written.len());
+        let what = match values {
+            Some(values) => counted(values, "value", "values"),
+            None => {
+                format!("{}, {}", counted(objects, "object", "objects"), counted(entries, "entry", "entries"))
+            }
+        };
+        println!("{name}: {verb}, {what}, {} bytes", written.len());
     });
     Ok(())
 }
@@ -117,6 +129,9 @@ fn configure(out: &Output, device: &mut Device, changes: &Changes<'_>) -> Result
             eds::to_bytes(value, base, node.or(Some(1)))
                 .map_err(|error| Exit::usage(format!("{object}=\"{value}\": {error}")))?;
         }
+        if !entry.access.is_some_and(eds::Access::can_write) {
+            out.remark(format!("{object} cannot be written: no device takes this value"));
+        }
         entry.value = Some(value.to_owned());
     }
     Ok(())
@@ -138,27 +153,36 @@ fn unconfigure(out: &Output, device: &mut Device) {
     ));
 }
 
-fn render(
-    reading: &Reading,
-    device: &Device,
-    kind: Kind,
-    changes: &Changes<'_>,
-) -> Result<(Vec<u8>, Vec<String>), Exit> {
+/// The bytes of the output.
+struct Rendered {
+    written: Vec<u8>,
+    /// What its format has no place for.
+    lost: Vec<String>,
+    /// How many values a concise DCF has.
+    values: Option<usize>,
+}
+
+fn render(reading: &Reading, device: &Device, kind: Kind, changes: &Changes<'_>) -> Result<Rendered, Exit> {
+    let text = |(written, lost)| Ok(Rendered { written, lost, values: None });
     let format = match kind {
         Kind::Eds | Kind::Dcf => Format::Eds,
         Kind::Xdd | Kind::Xdc => Format::Xdd,
         Kind::Concise => {
             let entries = device.to_concise(None).map_err(|error| {
-                let node = if error.error == ValueError::NeedsNodeId { ": give it by --node N" } else { "" };
-                Exit::check(format!("{error}{node}"))
+                if error.error == ValueError::NeedsNodeId {
+                    Exit::usage(format!("{error}: give it by --node N"))
+                } else {
+                    Exit::check(error.to_string())
+                }
             })?;
-            return Ok((eds::encode_concise(&entries), Vec::new()));
+            let written = eds::encode_concise(&entries);
+            return Ok(Rendered { written, lost: Vec::new(), values: Some(entries.len()) });
         }
     };
     if format == reading.source.format && !changes.anew {
-        return Ok((reading.source.encode(&reading.update(device)), Vec::new()));
+        return text((reading.source.encode(&reading.update(device)), Vec::new()));
     }
-    Ok(match format {
+    text(match format {
         Format::Eds => (reading.source.encode(&eds::write_eds(device)), eds::lost_in_eds(device)),
         Format::Xdd => {
             let (text, lost) = eds::write_xdd(device);

@@ -37,7 +37,7 @@ pub(super) fn run(
             _ => false,
         };
         if missing {
-            return Err(Exit::check(format!("{text} is not in {}", input.file.display())));
+            return Err(Exit::usage(format!("{text} is not in {}", input.file.display())));
         }
         places.push((index, subindex));
     }
