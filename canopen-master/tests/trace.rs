@@ -279,18 +279,19 @@ fn states_and_guarding() {
     assert_eq!(script.hear("000#0100"), Kind::Nmt { command: Some(Command::Start), target: 0 });
     assert_eq!(script.tracer.state(0, one), Some(State::Operational));
     assert_eq!(script.hear("701#R"), Kind::GuardRequest { node: one, unanswered: false });
-    let reply = |toggle, wrong_toggle| Kind::GuardReply {
+    let reply = |toggle, wrong_toggle, before| Kind::GuardReply {
         node: one,
         toggle,
         wrong_toggle,
         state: Some(State::Operational),
-        before: Some(State::Operational),
+        before: Some(before),
     };
-    assert_eq!(script.hear("701#05"), reply(false, false));
+    // Shown before, not told since.
+    assert_eq!(script.hear("701#05"), reply(false, false, State::PreOperational));
     script.hear("701#R");
-    assert_eq!(script.hear("701#85"), reply(true, false));
+    assert_eq!(script.hear("701#85"), reply(true, false, State::Operational));
     script.hear("701#R");
-    assert_eq!(script.hear("701#85"), reply(true, true));
+    assert_eq!(script.hear("701#85"), reply(true, true, State::Operational));
     script.hear("701#R");
     assert_eq!(script.hear("701#R"), Kind::GuardRequest { node: one, unanswered: true });
     assert_eq!(script.hear("701#0500"), Kind::Unknown, "two bytes are no state");

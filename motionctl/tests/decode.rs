@@ -510,3 +510,99 @@ fn an_fd_frame_is_told_in_words() {
         assert!(!told.contains('{'), "{told}");
     }
 }
+
+#[test]
+fn a_node_that_falls_silent_is_told_and_is_not_in_its_period() {
+    let mut log = String::new();
+    for beat in (0..20).chain(60..80) {
+        log.push_str(&format!("({}.{}) can0 705#05\n", beat / 10, beat % 10));
+    }
+    for beat in 0..100 {
+        log.push_str(&format!("({}.{}) can0 080#\n", 8 + beat / 10, beat % 10));
+    }
+    let told = story(&log, &[]);
+    assert!(told.contains("6.000000  can0   node 5    its heartbeat is back after 4.1 s"), "{told}");
+    assert!(told.contains("40 times, every 100.0 ms (longest 4100.0), silent for the last 10.0 s"), "{told}");
+    let reset = story(log.replacen("(6.0) can0 705#05", "(6.0) can0 705#00", 1), &[]);
+    assert!(reset.contains("node 5    boots up again, 4.1 s after its last heartbeat"), "{reset}");
+}
+
+/// Two captures, one behind the other.
+#[test]
+fn a_time_that_goes_back_is_told() {
+    let beats: String = (0..5).map(|beat| format!("(5.{beat}) can0 705#05\n")).collect();
+    let told = story(format!("{beats}(1.0) can0 705#05\n(1.1) can0 705#05\n"), &["--times", "absolute"]);
+    assert!(told.contains("1.000000  capture   its time goes back by 4.4 s"), "{told}");
+    assert!(told.contains("7 times, every 100.0 ms\n"), "{told}");
+}
+
+/// What a node was told is not yet what it is.
+#[test]
+fn a_state_is_told_when_the_node_shows_it() {
+    let told = story("(1.0) can0 705#7F\n(1.1) can0 000#0105\n(1.2) can0 705#7F\n(1.3) can0 705#05\n", &[]);
+    assert!(!told.contains("pre-operational now"), "{told}");
+    assert!(told.contains("1.300000  can0   node 5    is operational now, was pre-operational"), "{told}");
+}
+
+#[test]
+fn a_pdo_shorter_than_its_mapping_is_told_once() {
+    let mapping = "(1.0) can0 605#23001A0110004160\n(1.1) can0 585#60001A0100000000\n\
+        (1.2) can0 605#23001A0220006460\n(1.3) can0 585#60001A0200000000\n\
+        (1.4) can0 605#2F001A0002000000\n(1.5) can0 585#60001A0000000000\n";
+    let frames = "(2.0) can0 185#370601000000\n(2.1) can0 185#3706\n(2.2) can0 185#3606\n(2.3) can0 185#370602000000\n\
+        (2.4) can0 185#\n";
+    let told = story(format!("{mapping}{frames}"), &[]);
+    let said: Vec<&str> = told.lines().filter(|line| line.contains("its mapping")).collect();
+    assert_eq!(said.len(), 2, "{told}");
+    assert!(said[0].contains("TPDO 1 has 2 bytes, its mapping 6"), "{told}");
+    assert!(said[1].contains("TPDO 1 has 0 bytes, its mapping 6"), "{told}");
+}
+
+#[test]
+fn an_emergency_that_leaves_others_is_not_over() {
+    let told = story(
+        "(1.0) can0 085#3081110000000000\n(1.1) can0 085#0000040000000000\n(1.2) can0 085#0000000000000000\n",
+        &[],
+    );
+    assert!(told.contains("an emergency is over, others are not, register 04h"), "{told}");
+    assert!(told.contains("emergency over: no error, register 00h"), "{told}");
+}
+
+#[test]
+fn a_status_word_without_a_state_is_told() {
+    let told = story(
+        "(1.0) can0 605#23001A0110004160\n(1.1) can0 585#60001A0100000000\n(1.2) can0 605#2F001A0001000000\n\
+         (1.3) can0 585#60001A0000000000\n(2.0) can0 185#3706\n(2.1) can0 185#1122\n(2.2) can0 185#3706\n",
+        &[],
+    );
+    assert!(
+        told.contains("2.100000  can0   node 5    TPDO 1: status word = 2211h, no state of CiA 402"),
+        "{told}"
+    );
+    assert!(told.contains("2.200000  can0   node 5    TPDO 1: status word = 0637h"), "{told}");
+}
+
+#[test]
+fn the_begin_of_a_fastscan_is_no_bit_128() {
+    let told = story("(1.0) can0 7E5#5100000000800000\n(1.1) can0 7E5#516A0000001F0000\n", &[]);
+    assert!(told.contains("master: fastscan: who has no node ID?"), "{told}");
+    assert!(told.contains("fastscan vendor 0000006Ah from bit 31"), "{told}");
+}
+
+/// A file of another format than it was taken for is not one without traffic.
+#[test]
+fn a_capture_without_a_frame_is_trouble_with_a_file() {
+    let bench = Bench::new();
+    std::fs::write(bench.path("log"), "(1.0) can0 705#05\n").unwrap();
+    std::fs::write(bench.path("empty"), "").unwrap();
+    for format in ["asc", "trc", "pcap", "lb2", "lb2-hex"] {
+        bench
+            .run(&["decode", "--format", format, "log"])
+            .ends(5)
+            .says("log: a capture expected, not one frame");
+        bench.run(&["--json", "decode", "--format", format, "log", "log"]).ends(5);
+    }
+    bench.run(&["decode", "--format", "candump", "log"]).ends(0);
+    bench.run(&["decode", "--format", "candump", "empty"]).ends(0).says("0 frames");
+    bench.run(&["decode", "--eds", "5=a.eds", "--eds", "5=b.eds", "log"]).ends(5);
+}

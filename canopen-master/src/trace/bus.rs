@@ -80,7 +80,10 @@ impl Role {
 
 #[derive(Debug, Clone, Copy, Default)]
 struct NodeState {
+    /// Shown last, or told last.
     state: Option<State>,
+    /// Shown last.
+    shown: Option<State>,
     /// A guard request has not been answered.
     asked: bool,
     /// Toggle of the last guard reply.
@@ -92,13 +95,14 @@ impl NodeState {
     #[inline]
     fn handle(&mut self, node: NodeId, data: &[u8]) -> Kind {
         let &[byte] = data else { return Kind::Unknown };
-        let before = self.state;
+        let before = self.shown;
         if byte == 0 {
-            *self = Self { state: Some(State::BootUp), ..Self::default() };
+            *self = Self { state: Some(State::BootUp), shown: Some(State::BootUp), ..Self::default() };
             return Kind::BootUp { node, before };
         }
         let state = State::from_raw(byte & 0x7F);
-        self.state = state.or(before);
+        self.shown = state.or(before);
+        self.state = state.or(self.state);
         let toggle = byte & 0x80 != 0;
         // A heartbeat has no toggle bit: the request of such an answer is missing in the capture.
         if self.asked || toggle {

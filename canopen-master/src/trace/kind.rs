@@ -72,7 +72,7 @@ pub enum Kind {
         wrong_toggle: bool,
         /// `None` for a number that is no state.
         state: Option<State>,
-        /// State known before.
+        /// State that it showed before.
         before: Option<State>,
     },
     /// Heartbeat.
@@ -81,14 +81,14 @@ pub enum Kind {
         node: NodeId,
         /// `None` for a number that is no state.
         state: Option<State>,
-        /// State known before.
+        /// State that it showed before.
         before: Option<State>,
     },
     /// A node has started.
     BootUp {
         /// Which.
         node: NodeId,
-        /// State known before.
+        /// State that it showed before.
         before: Option<State>,
     },
     /// Layer setting services.

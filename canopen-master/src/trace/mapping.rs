@@ -101,6 +101,13 @@ impl<'a> Fields<'a> {
     pub(super) fn new(objects: &'a [Mapped], data: &'a [u8]) -> Self {
         Self { objects: objects.iter(), data, bit: 0 }
     }
+
+    /// Bytes that the objects from here on take; a frame may have fewer.
+    #[must_use]
+    pub fn expected_len(&self) -> usize {
+        let bits: usize = self.objects.clone().map(|object| usize::from(object.bits)).sum();
+        (self.bit + bits).div_ceil(8)
+    }
 }
 
 impl Iterator for Fields<'_> {
@@ -139,6 +146,8 @@ mod tests {
         let data = [0b1010_1101, 0xFF, 0x34, 0x12, 1, 2];
         let values: Vec<u64> = Fields::new(&objects, &data).map(|field| field.raw).collect();
         assert_eq!(values, [5, 0x1FF5, 0x1234]);
+        assert_eq!(Fields::new(&objects, &data).expected_len(), 8);
+        assert_eq!(Fields::new(&[], &data).expected_len(), 0);
     }
 
     #[test]

@@ -21,7 +21,7 @@ pub(crate) struct Decode {
 /// How traffic is to be understood.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct Reading {
-    /// EDS or DCF that names a node's objects and says its PDO mapping
+    /// EDS, DCF or XDD that names a node's objects and says its PDO mapping
     #[arg(long, value_name = "NODE=FILE")]
     pub(crate) eds: Vec<String>,
     /// A node is a LinMot drive, though the traffic does not show its vendor

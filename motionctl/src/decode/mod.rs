@@ -41,6 +41,9 @@ pub(crate) struct Totals {
     copies_by_kind: [u64; NAMES.len()],
 }
 
+/// A file that is of another format than it was taken for, or damaged from end to end.
+const NOTHING: &str = "a capture expected, not one frame is in it; --format says which format it has";
+
 /// Names of what a frame can be, in the order of the summary.
 const NAMES: [&str; 17] = [
     "nmt",
@@ -108,6 +111,11 @@ pub(crate) const fn node_of(kind: &Kind) -> Option<u8> {
 }
 
 impl Totals {
+    /// What gave no frame.
+    const fn rejected(&self) -> u64 {
+        self.damaged as u64 + self.discarded_bytes
+    }
+
     fn count(&mut self, name: usize, copy: bool) {
         self.frames += 1;
         self.copies += u64::from(copy);
@@ -165,7 +173,14 @@ pub(crate) fn run(out: &Output, args: &Decode) -> Result<(), Exit> {
             if !out.json && args.files.len() > 1 {
                 writeln!(stdout, "== {file}")?;
             }
-            match decode_file(out, args, file, &names, &mut totals, &mut stdout) {
+            let before = (totals.frames, totals.rejected());
+            let decoded = decode_file(out, args, file, &names, &mut totals, &mut stdout);
+            let decoded =
+                decoded.and_then(|()| match (totals.frames - before.0, totals.rejected() - before.1) {
+                    (0, 1..) => Err(Stop::Capture(Exit::file(file, &NOTHING))),
+                    _ => Ok(()),
+                });
+            match decoded {
                 // The others are decoded all the same.
                 Err(Stop::Capture(exit)) => {
                     if let Some(before) = unreadable.replace(exit) {

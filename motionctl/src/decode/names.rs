@@ -42,6 +42,9 @@ impl Names {
                     "--eds {argument}: NODE=FILE with a node of 1 to 127 expected"
                 )));
             };
+            if names.devices.iter().any(|(known, _)| *known == node) {
+                return Err(Exit::usage(format!("--eds {argument}: node {node} has a file already")));
+            }
             let content = crate::eds::bytes(std::path::Path::new(file))?;
             let reading = eds::read(&content).map_err(|error| Exit::file(file, &error))?;
             names.devices.push((node, reading.device));
@@ -94,6 +97,10 @@ impl Names {
             text.push_str(&format!(" {}", object.name()));
             if let Some(entry) = object.entry(sub).filter(|_| object.is_composed()) {
                 text.push_str(&format!(", {}", entry.name));
+                // Some files call all of them the same.
+                if object.entries().iter().filter(|other| other.name == entry.name).count() > 1 {
+                    text.push_str(&format!(" {sub}"));
+                }
             }
             return text;
         }
@@ -237,10 +244,8 @@ fn special(at: Address, data: &[u8]) -> Option<String> {
         }
         (0x1010, 1..) if data == od::SAVE => "\"save\"".into(),
         (0x1011, 1..) if data == od::LOAD => "\"load\"".into(),
-        (0x1005 | 0x1012 | 0x1014, 0) | (0x1400..=0x15FF | 0x1800..=0x19FF, 1) => {
-            let cob = CobId(u32()?);
-            let off = if cob.is_valid() || at.index == 0x1005 { "" } else { ", switched off" };
-            format!("{:03X}h{off}", cob.id())
+        (0x1005 | 0x1012 | 0x1014, 0) | (0x1200..=0x12FF, 1 | 2) | (0x1400..=0x15FF | 0x1800..=0x19FF, 1) => {
+            cob_id(at.index, CobId(u32()?))
         }
         (0x1400..=0x15FF | 0x1800..=0x19FF, 2) => {
             let &[kind, ..] = data else { return None };
@@ -249,7 +254,8 @@ fn special(at: Address, data: &[u8]) -> Option<String> {
                 1 => "1, at every SYNC".into(),
                 2..=240 => format!("{kind}, at every {kind}th SYNC"),
                 252 | 253 => format!("{kind}, on request"),
-                254 | 255 => format!("{kind}, on events"),
+                254 => "254, on events of the manufacturer".into(),
+                255 => "255, on events of the profile".into(),
                 _ => format!("{kind}, reserved"),
             }
         }
@@ -261,6 +267,22 @@ fn special(at: Address, data: &[u8]) -> Option<String> {
         }
         _ => return None,
     })
+}
+
+/// An identifier and what its upper bits say (CiA 301, 7.5.2): 1005h and 1012h have bits of their own.
+fn cob_id(index: u16, cob: CobId) -> String {
+    let upper = (cob.0 >> 30 & 1 != 0, !cob.is_valid());
+    let what = match (index, upper) {
+        (0x1005, (true, _)) => ", produces it",
+        (0x1012, (true, true)) => ", produces and consumes it",
+        (0x1012, (true, false)) => ", produces it",
+        (0x1012, (false, true)) => ", consumes it",
+        (0x1005 | 0x1012, _) => "",
+        (_, (_, true)) => ", switched off",
+        (0x1800..=0x19FF, (true, false)) => ", no remote frames",
+        _ => "",
+    };
+    format!("{:03X}h{what}", cob.id())
 }
 
 /// A control word: what it asks for.
@@ -320,6 +342,15 @@ mod tests {
             (Address::new(0x1000, 0), &[0x92, 0x01, 0x02, 0x00], "00020192h, drive (CiA 402)"),
             (Address::new(0x1A00, 1), &[0x10, 0x00, 0x41, 0x60], "6041h:00 status word, 16 bits"),
             (Address::new(0x1800, 1), &[0x81, 0x01, 0x00, 0xC0], "181h, switched off"),
+            (Address::new(0x1800, 1), &[0x81, 0x01, 0x00, 0x40], "181h, no remote frames"),
+            (Address::new(0x1400, 1), &[0x01, 0x02, 0x00, 0x40], "201h"),
+            (Address::new(0x1280, 1), &[0x07, 0x06, 0x00, 0x80], "607h, switched off"),
+            (Address::new(0x1005, 0), &[0x80, 0x00, 0x00, 0x40], "080h, produces it"),
+            (Address::new(0x1005, 0), &[0x80, 0x00, 0x00, 0x80], "080h"),
+            (Address::new(0x1012, 0), &[0x00, 0x01, 0x00, 0x80], "100h, consumes it"),
+            (Address::new(0x1012, 0), &[0x00, 0x01, 0x00, 0xC0], "100h, produces and consumes it"),
+            (Address::new(0x1012, 0), &[0x00, 0x01, 0x00, 0x00], "100h"),
+            (Address::new(0x1014, 0), &[0x85, 0x00, 0x00, 0x80], "085h, switched off"),
             (Address::new(0x1008, 0), b"LD 2000\0", "\"LD 2000\""),
             (Address::new(0x1008, 0), b"Sonderger\xE4t", "\"Sonderger\u{E4}t\""),
             (Address::new(0x1008, 0), "Ger\u{E4}t".as_bytes(), "\"Ger\u{E4}t\""),

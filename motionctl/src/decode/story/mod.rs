@@ -10,7 +10,7 @@ mod sdo;
 mod words;
 
 use core::fmt::Write as _;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write;
 
 use canopen_master::ds402::StatusWord;
@@ -22,6 +22,7 @@ use motion_io::capture::{Frame, FrameKind, Record, Time};
 use super::Teller;
 use super::hear::number_of;
 use super::names::{Names, bytes};
+use crate::output::counted;
 pub(crate) use repeats::{Count, Cycle};
 pub(crate) use rhythm::Rhythm;
 pub(super) use words::summary;
@@ -39,11 +40,16 @@ pub(crate) struct Story<'a> {
     /// Time of the first frame, where times are times of day.
     start: Option<i64>,
     last_time: Option<i64>,
+    /// Latest time so far.
+    newest: Option<i64>,
     /// Time of the line told last.
     latest: Option<i64>,
     cycles: BTreeMap<Cycle, Count>,
     objects: BTreeMap<(u16, NodeId, Address, bool), Told>,
-    drives: BTreeMap<(u16, NodeId), ds402::State>,
+    /// `None`: a status word that shows no state.
+    drives: BTreeMap<(u16, NodeId), Option<ds402::State>>,
+    /// PDOs with fewer bytes than their mapping has.
+    short: BTreeSet<Cycle>,
     silent: BTreeMap<(u16, NodeId), u32>,
     last: Last,
 }
@@ -72,10 +78,12 @@ impl<'a> Story<'a> {
             out: Vec::new(),
             start: None,
             last_time: None,
+            newest: None,
             latest: None,
             cycles: BTreeMap::new(),
             objects: BTreeMap::new(),
             drives: BTreeMap::new(),
+            short: BTreeSet::new(),
             silent: BTreeMap::new(),
             last: Last::default(),
         }
@@ -88,7 +96,7 @@ impl<'a> Story<'a> {
 
     /// The state that a drive's status word last showed.
     pub(crate) fn drive(&self, bus: u16, node: NodeId) -> Option<ds402::State> {
-        self.drives.get(&(bus, node)).copied()
+        self.drives.get(&(bus, node)).copied().flatten()
     }
 
     /// Guard requests that a node has not answered since its last answer.
@@ -151,6 +159,13 @@ impl<'a> Story<'a> {
         if !changed {
             return;
         }
+        let (expected, len) = (tracer.mapped(number, kind, frame.data()).expected_len(), frame.len());
+        if len >= expected {
+            self.short.remove(&cycle);
+        } else if self.short.insert(cycle) {
+            let what = format!("{name} {pdo} has {}, its mapping {expected}", counted(len, "byte", "bytes"));
+            self.say(time, bus, &who(node), &what);
+        }
         let mut fields = Vec::new();
         let mut mapped = false;
         for field in tracer.mapped(number, kind, frame.data()) {
@@ -174,7 +189,7 @@ impl<'a> Story<'a> {
     fn is_news(&mut self, bus: u16, node: NodeId, at: Address, data: &[u8]) -> bool {
         match (at, data) {
             (Address { index: ds402::STATUS_WORD, sub: 0 }, &[low, high]) => {
-                let Some(state) = StatusWord(u16::from_le_bytes([low, high])).state() else { return false };
+                let state = StatusWord(u16::from_le_bytes([low, high])).state();
                 self.drives.insert((bus, node), state) != Some(state)
             }
             (Address { index: ds402::CONTROL_WORD | ds402::MODE | ds402::MODE_DISPLAY, sub: 0 }, data) => {
@@ -218,8 +233,8 @@ impl<'a> Story<'a> {
                 self.say(time, bus, &who(node), &format!("shows a state that there is not: {data}"));
             }
             (Some(is), None) => self.say(time, bus, &who(node), &format!("is {is}")),
-            (Some(is), Some(was)) if is != was && was == State::BootUp && is == State::PreOperational => {
-                self.say(time, bus, &who(node), "has started, is pre-operational");
+            (Some(is), Some(State::BootUp)) if is != State::BootUp => {
+                self.say(time, bus, &who(node), &format!("has started, is {is}"));
             }
             (Some(is), Some(was)) if is != was => {
                 self.say(time, bus, &who(node), &format!("is {is} now, was {was}"));
@@ -244,6 +259,10 @@ impl<'a> Story<'a> {
         let bus = bus.unwrap_or("");
         let _ = writeln!(self.out, "{time:>12}  {bus:<6}   · {:?}  {name}{channel}{copy}", record.frame);
     }
+}
+
+fn seconds(nanos: i64) -> String {
+    format!("{:.1} s", nanos as f64 / 1e9)
 }
 
 fn who(node: NodeId) -> String {
@@ -274,6 +293,14 @@ impl Teller for Story<'_> {
             self.start = Some(first);
             let _ = writeln!(self.out, "{:>12}  is {}", "0.000000", date(first));
         }
+        if let Some((newest, now)) =
+            self.newest.zip(time).filter(|(newest, now)| newest.saturating_sub(*now) >= 1_000_000_000)
+        {
+            let back = seconds(newest.saturating_sub(now));
+            self.say(time, None, "capture", &format!("its time goes back by {back}"));
+            self.newest = time;
+        }
+        self.newest = self.newest.max(time);
         self.last_time = time;
         let number = number_of(record);
         if self.every_frame {
@@ -323,6 +350,9 @@ impl Teller for Story<'_> {
             }
             Kind::Emcy { node, code, register } => {
                 let what = match code {
+                    Some(code) if code.0 == 0 && register.is_some_and(|register| register != 0) => {
+                        "an emergency is over, others are not".into()
+                    }
                     Some(code) if code.0 == 0 => "emergency over: no error".into(),
                     Some(code) => format!("EMERGENCY {:04X}h, {}", code.0, code.name()),
                     None => "EMERGENCY without a code".into(),
@@ -361,16 +391,24 @@ impl Teller for Story<'_> {
                 self.state(frame, time, bus, node, state, before);
             }
             Kind::Heartbeat { node, state, before } => {
-                self.cycle(Cycle::Heartbeat(number, node), time, &[]);
+                let heartbeat = Cycle::Heartbeat(number, node);
+                if let Some(gap) = self.cycles.get(&heartbeat).and_then(|count| count.rhythm.silence(time)) {
+                    self.say(time, bus, &who(node), &format!("its heartbeat is back after {}", seconds(gap)));
+                }
+                self.cycle(heartbeat, time, &[]);
                 self.state(frame, time, bus, node, state, before);
             }
             Kind::BootUp { node, before } => {
                 self.drives.remove(&(number, node));
+                let mut silent = String::new();
                 if let Some(count) = self.cycles.get_mut(&Cycle::Heartbeat(number, node)) {
+                    if let Some(gap) = count.rhythm.silence(time) {
+                        silent = format!(", {} after its last heartbeat", seconds(gap));
+                    }
                     count.rhythm.pause();
                 }
                 let again = if before.is_some_and(|before| before != State::BootUp) { " again" } else { "" };
-                self.say(time, bus, &who(node), &format!("boots up{again}"));
+                self.say(time, bus, &who(node), &format!("boots up{again}{silent}"));
             }
             Kind::Lss(message) => {
                 let (from, what) = lss_words(&message, frame.data());

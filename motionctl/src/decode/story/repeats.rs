@@ -6,8 +6,8 @@ use canopen_master::NodeId;
 use canopen_master::trace::PdoDirection;
 
 use super::super::Ear;
-use super::Story;
 use super::rhythm::Rhythm;
+use super::{Story, seconds};
 
 /// Something that repeats itself; the number of its bus first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -70,6 +70,14 @@ impl Cycle {
     }
 }
 
+/// How often something comes, and its longest gap where that is no jitter.
+fn period(rhythm: &Rhythm) -> String {
+    let Some(mean) = rhythm.mean() else { return String::new() };
+    let longest = rhythm.longest.map(|gap| gap as f64).filter(|gap| *gap > mean * 1.5);
+    let longest = longest.map_or_else(String::new, |gap| format!(" (longest {:.1})", gap / 1e6));
+    format!(", every {:.1} ms{longest}", mean / 1e6)
+}
+
 impl Story<'_> {
     /// Counts a frame of a cycle: whether it is the first, and whether its data are new.
     pub(super) fn cycle(&mut self, cycle: Cycle, time: Option<i64>, data: &[u8]) -> (bool, bool) {
@@ -102,15 +110,19 @@ impl Story<'_> {
             }
             let name = ear.bus_name(cycle.bus()).filter(|_| ear.has_several_buses());
             let bus = name.map_or_else(String::new, |name| format!("{name} "));
-            let period =
-                count.rhythm.mean().map_or_else(String::new, |mean| format!(", every {:.1} ms", mean / 1e6));
+            let period = period(&count.rhythm);
             let changes = match count.changes {
                 _ if !cycle.carries() => String::new(),
                 0 => ", always the same".into(),
                 1 => ", 1 change".into(),
                 changes => format!(", {changes} changes"),
             };
-            let _ = writeln!(self.out, "  {bus}{what}: {} times{period}{changes}", count.rhythm.number);
+            let silent = match (cycle, count.rhythm.silence(self.newest)) {
+                (Cycle::Heartbeat(..), Some(gap)) => format!(", silent for the last {}", seconds(gap)),
+                _ => String::new(),
+            };
+            let _ =
+                writeln!(self.out, "  {bus}{what}: {} times{period}{changes}{silent}", count.rhythm.number);
         }
         if again > 0 {
             let _ = writeln!(self.out, "  SDO transfers like those told: {again}");

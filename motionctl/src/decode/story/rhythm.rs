@@ -19,6 +19,8 @@ pub(crate) struct Rhythm {
     pub(crate) missed: u64,
     /// A gap that may be a new period, and how many are missing if it is none.
     doubt: Option<(i64, u64)>,
+    /// Sum and number of the gaps that are its period and no holes.
+    regular: (i64, u32),
     /// It began anew after the last one.
     paused: bool,
 }
@@ -41,12 +43,15 @@ impl Rhythm {
         self.longest = Some(self.longest.map_or(gap, |longest| longest.max(gap)));
         let Some(period) = self.period else {
             self.period = Some(gap);
+            self.is_regular(gap);
             return;
         };
         match self.doubt.take() {
             // The same gap again: that is how it goes now.
             Some((new, _)) if (gap - new).abs() <= new / 4 => {
                 self.period = Some(gap);
+                self.is_regular(new);
+                self.is_regular(gap);
                 return;
             }
             Some((_, missing)) => self.missed = self.missed.saturating_add(missing),
@@ -57,7 +62,20 @@ impl Rhythm {
             self.doubt = Some((gap, u64::try_from(missing).unwrap_or(0)));
         } else {
             self.period = Some(period + (gap - period) / SMOOTH);
+            self.is_regular(gap);
         }
+    }
+
+    const fn is_regular(&mut self, gap: i64) {
+        let (sum, number) = self.regular;
+        self.regular = (sum.saturating_add(gap), number.saturating_add(1));
+    }
+
+    /// How long it has been silent at a time, where that is so long that at least two are missing.
+    pub(crate) fn silence(&self, time: Option<i64>) -> Option<i64> {
+        let (period, last) = self.period.zip(self.last).filter(|_| !self.paused)?;
+        let gap = time?.saturating_sub(last);
+        (period > 0 && gap.saturating_mul(10) > period.saturating_mul(25)).then_some(gap)
     }
 
     /// It begins anew: what is between is no gap.
@@ -67,10 +85,10 @@ impl Rhythm {
         self.doubt = None;
     }
 
-    /// Over all of it, in nanoseconds.
+    /// Its period over all of the time, holes apart, in nanoseconds.
     pub(crate) fn mean(&self) -> Option<f64> {
-        let (first, last) = self.first.zip(self.last).filter(|(first, last)| last > first)?;
-        Some(last.saturating_sub(first) as f64 / (self.number - 1) as f64)
+        let (sum, number) = self.regular;
+        (sum > 0).then(|| sum as f64 / f64::from(number))
     }
 }
 
@@ -103,6 +121,17 @@ mod tests {
         assert!(faster.period.unwrap() < 110, "{faster:?}");
     }
 
+    /// A node that was away, a capture that is two: neither is its period.
+    #[test]
+    fn holes_and_times_that_go_back_are_not_in_the_mean() {
+        assert_eq!(heard([0, 100, 200, 9000, 9100, 9200]).mean(), Some(100.0));
+        assert_eq!(heard([0, 100, 200, 0, 100, 200]).mean(), Some(100.0));
+        assert_eq!(heard([0, 1000, 2000, 7000, 12000]).mean(), Some(3000.0), "a new period is one");
+        let rhythm = heard([0, 100, 200]);
+        let silent = |time| rhythm.silence(Some(time));
+        assert_eq!((silent(300), silent(450), silent(451), silent(100)), (None, None, Some(251), None));
+    }
+
     /// Gaps of all of time, again and again.
     #[test]
     fn what_is_missing_is_counted_without_overflow() {
@@ -122,6 +151,7 @@ mod tests {
         assert_eq!((rhythm.number, rhythm.missed), (6, 0));
         assert_eq!(heard([3, 3, 3, 3]).period, Some(0));
         assert_eq!(heard([0, 10]).mean(), Some(10.0));
+        assert_eq!(heard([3, 3, 3]).mean(), None);
         let mut again = heard([0, 100, 200]);
         again.pause();
         again.beat(Some(5000));

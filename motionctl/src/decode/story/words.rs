@@ -14,7 +14,7 @@ pub(super) fn lss_words(message: &Lss, data: &[u8]) -> (&'static str, String) {
         Lss::Request(Some(request)) => {
             let what = match *request {
                 lss::Request::SwitchGlobal(mode) => format!("all to {mode:?}").to_lowercase(),
-                lss::Request::Select(part, value) => format!("select {part:?} {value:08X}h").to_lowercase(),
+                lss::Request::Select(part, value) => format!("select {} {value:08X}h", part_words(part)),
                 lss::Request::ConfigureNodeId(node) => format!("node ID is to be {node}"),
                 lss::Request::ConfigureBitTiming { table, index } => {
                     let rate = lss::BitTiming::from_index(index)
@@ -29,11 +29,13 @@ pub(super) fn lss_words(message: &Lss, data: &[u8]) -> (&'static str, String) {
                     format!("change the bit rate in {delay_ms} ms")
                 }
                 lss::Request::Store => "store node ID and bit rate".into(),
-                lss::Request::Inquire(part) => format!("say your {part:?}").to_lowercase(),
+                lss::Request::Inquire(part) => format!("say your {}", part_words(part)),
                 lss::Request::InquireNodeId => "say your node ID".into(),
                 lss::Request::IdentifyUnconfigured => "who has no node ID?".into(),
+                // Bit 80h begins a fastscan: every unconfigured slave answers.
+                lss::Request::Fastscan { bit: 0x80, .. } => "fastscan: who has no node ID?".into(),
                 lss::Request::Fastscan { number, bit, part, .. } => {
-                    format!("fastscan {part:?} {number:08X}h from bit {bit}").to_lowercase()
+                    format!("fastscan {} {number:08X}h from bit {bit}", part_words(part))
                 }
             };
             ("LSS", format!("master: {what}"))
@@ -42,7 +44,7 @@ pub(super) fn lss_words(message: &Lss, data: &[u8]) -> (&'static str, String) {
             let what = match *response {
                 lss::Response::Selected => "selected".into(),
                 lss::Response::Done { result, .. } => result.to_string(),
-                lss::Response::Identity(part, value) => format!("{part:?} {value:08X}h").to_lowercase(),
+                lss::Response::Identity(part, value) => format!("{} {value:08X}h", part_words(part)),
                 lss::Response::NodeId(node) => format!("node ID {node}"),
                 lss::Response::Identified => "here, it matches".into(),
                 lss::Response::Unconfigured => "here, without node ID".into(),
@@ -52,6 +54,10 @@ pub(super) fn lss_words(message: &Lss, data: &[u8]) -> (&'static str, String) {
         Lss::Request(None) => ("LSS", format!("master: unknown command, {}", bytes(data))),
         Lss::Response(None) => ("LSS", format!("slave: unknown command, {}", bytes(data))),
     }
+}
+
+fn part_words(part: lss::Part) -> String {
+    format!("{part:?}").to_lowercase()
 }
 
 /// Nanoseconds since 1970 as date and time of day, UTC.
