@@ -346,6 +346,49 @@ fn a_transfer_that_began_before_the_capture_is_told_as_one() {
     assert!(objects.iter().all(|object| object["kind"] != "sdo-transfer"), "{objects:?}");
 }
 
+/// A transfer of node 1 with its frames 1 ms apart, again and again.
+fn log_of(transfers: &[&[&str]]) -> String {
+    let lines = transfers.concat();
+    lines.iter().zip(1..).map(|(frame, ms)| format!("(0.{ms:03}) can0 {frame}\n")).collect()
+}
+
+/// It was told as done without a word, and not at all after the same data with the right CRC.
+#[test]
+fn a_wrong_crc_of_a_block_transfer_is_told() {
+    let upload = |end| {
+        [
+            "601#A400200104000000",
+            "581#C400200100000000",
+            "601#A300000000000000",
+            "581#0131323334353637",
+            "581#8238390000000000",
+            "601#A202040000000000",
+            end,
+            "601#A100000000000000",
+        ]
+    };
+    let (right, wrong) = (upload("581#D5C3310000000000"), upload("581#D5C4310000000000"));
+    let log = log_of(&[&right, &wrong, &wrong]);
+    expect_lines(
+        &story(&log, &[]),
+        &[
+            "0.008000  can0   node 1    read  2000h:01 = \"123456789\"  [block, 9 bytes in 7.0 ms]",
+            "0.016000  can0   node 1    read  2000h:01 = \"123456789\"  [block, 9 bytes in 7.0 ms], CRC WRONG: 31C4h \
+             came, 31C3h computed",
+            "",
+            "what repeated itself:",
+            "SDO transfers like those told: 1",
+            "",
+            "24 frames: 12 sdo-request, 12 sdo-response",
+        ],
+    );
+    let objects = objects(log.as_bytes(), &[]);
+    let transfers: Vec<_> = objects.iter().filter(|object| object["kind"] == "sdo-transfer").collect();
+    assert!(transfers.iter().all(|transfer| transfer["outcome"] == "done"), "{transfers:?}");
+    let errors: Vec<_> = transfers.iter().map(|transfer| transfer.get("crc_error")).collect();
+    assert_eq!(errors, [None, Some(&json!(true)), Some(&json!(true))]);
+}
+
 #[test]
 fn times_since_the_frame_before_are_added_up() {
     let log = " (000.000000)  can0  080   [0]\n (000.000200)  can0  601   [8]  40 41 60 00 00 00 00 00\n \

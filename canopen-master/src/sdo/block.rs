@@ -35,6 +35,14 @@ impl Crc {
     }
 }
 
+/// The check sum over all data of a block transfer.
+#[cfg(feature = "alloc")]
+pub(crate) fn check_sum(data: &[u8]) -> u16 {
+    let mut crc = Crc::default();
+    crc.update(data);
+    crc.0
+}
+
 /// The sending side.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Sender {

@@ -22,6 +22,8 @@ use pdo::cob::{SDO_REQUEST, SDO_RESPONSE};
 
 pub use abort::AbortCode;
 pub use block::MAX_BLOCK_SIZE;
+#[cfg(feature = "alloc")]
+pub(crate) use block::check_sum;
 pub use buffer::{Buffer, Either, Small};
 pub use client::{ANSWER, Block, Client, Fault, Finished, Options, Outcome, Refused, SubmitError, Ticket};
 pub use pdo::Address;

@@ -11,7 +11,7 @@ use core::time::Duration;
 use pdo::{Address, NodeId};
 
 use crate::sdo::message::{BlockSegment, Request, Response, SEGMENT};
-use crate::sdo::{AbortCode, UNNAMED};
+use crate::sdo::{AbortCode, UNNAMED, check_sum};
 use late::Lead;
 use step::{Step, address, initiates, step};
 
@@ -105,6 +105,15 @@ pub enum Outcome {
     Incomplete,
 }
 
+/// A CRC that is not that of the data.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct WrongCrc {
+    /// It came in the frame that ends the blocks.
+    pub found: u16,
+    /// Over the data that came.
+    pub computed: u16,
+}
+
 /// An SDO transfer that has ended.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Transfer {
@@ -127,6 +136,8 @@ pub struct Transfer {
     pub data: Vec<u8>,
     /// Bytes transferred.
     pub size: u64,
+    /// Of a block transfer heard without a gap, of which both sides agreed on a CRC: it is wrong.
+    pub wrong_crc: Option<WrongCrc>,
     /// How it ended.
     pub outcome: Outcome,
     /// Frames of both sides, the abort included.
@@ -173,6 +184,8 @@ struct Open {
     next: u8,
     /// Sequence number of the last segment of all, once seen.
     last: Option<u8>,
+    /// Both sides compute a CRC, and everything that it is over was heard.
+    check: bool,
 }
 
 impl Open {
@@ -193,12 +206,13 @@ impl Open {
             lacking: false,
             data: Vec::new(),
             size: 0,
+            wrong_crc: None,
             outcome: Outcome::Incomplete,
             frames: 0,
             began: now,
             ended: now,
         };
-        Self { transfer, phase, confirmed: 0, next: 1, last: None }
+        Self { transfer, phase, confirmed: 0, next: 1, last: None, check: false }
     }
 
     fn push(&mut self, bytes: &[u8]) {
@@ -221,6 +235,7 @@ impl Open {
         // Sequence number 1 again: the acknowledge between is missing in the capture.
         if segment.sequence == 1 && self.next > 1 {
             self.begin_sub_block();
+            self.check = false;
         }
         if segment.last {
             self.last = Some(segment.sequence);
@@ -250,9 +265,15 @@ impl Open {
         }
     }
 
-    fn end_of_blocks(&mut self, unused: u8) {
+    fn end_of_blocks(&mut self, unused: u8, found: u16) {
         if !self.transfer.lacking {
             self.truncate(self.transfer.size.saturating_sub(u64::from(unused)));
+            let kept = self.transfer.data.len() as u64 == self.transfer.size;
+            // Without the last acknowledge nobody knows what was taken of the segments before it.
+            if self.check && kept && self.phase == Phase::BlockEnd {
+                let computed = check_sum(&self.transfer.data);
+                self.transfer.wrong_crc = (computed != found).then_some(WrongCrc { found, computed });
+            }
         }
         self.phase = Phase::BlockEnding;
     }

@@ -93,12 +93,11 @@ fn step_request(open: &mut Open, request: &Request) -> Step {
             }
             Step::Goes
         }
-        (
-            Request::InitiateUpload { .. }
-            | Request::InitiateBlockUpload { .. }
-            | Request::InitiateBlockDownload { .. },
-            _,
-        ) => Step::Goes,
+        (Request::InitiateUpload { .. }, _) => Step::Goes,
+        (Request::InitiateBlockUpload { crc, .. } | Request::InitiateBlockDownload { crc, .. }, _) => {
+            open.check = crc;
+            Step::Goes
+        }
         (Request::UploadSegment { toggle }, Phase::Segments { toggle: next, .. })
             if upload && toggle == next =>
         {
@@ -124,8 +123,8 @@ fn step_request(open: &mut Open, request: &Request) -> Step {
             Step::Goes
         }
         (Request::EndBlockUpload, Phase::BlockEnding) if upload => Step::Ended(Outcome::Done),
-        (Request::EndBlockDownload { unused, .. }, Phase::BlockEnd | Phase::BlockData) if !upload => {
-            open.end_of_blocks(unused);
+        (Request::EndBlockDownload { unused, crc }, Phase::BlockEnd | Phase::BlockData) if !upload => {
+            open.end_of_blocks(unused, crc);
             Step::Goes
         }
         _ => Step::Foreign,
@@ -179,9 +178,10 @@ fn step_response(open: &mut Open, response: &Response) -> Step {
             open.phase = Phase::Segments { toggle: !toggle, asked: false, last: false };
             Step::Goes
         }
-        (Response::InitiateBlockDownload { at, .. }, Phase::Initiate)
+        (Response::InitiateBlockDownload { at, crc, .. }, Phase::Initiate)
             if !upload && mode == Mode::Block && mine(at, open) =>
         {
+            open.check &= crc;
             open.phase = Phase::BlockData;
             Step::Goes
         }
@@ -190,14 +190,15 @@ fn step_response(open: &mut Open, response: &Response) -> Step {
             Step::Goes
         }
         (Response::EndBlockDownload, Phase::BlockEnding) if !upload => Step::Ended(Outcome::Done),
-        (Response::InitiateBlockUpload { at, .. }, Phase::Initiate)
+        (Response::InitiateBlockUpload { at, crc, .. }, Phase::Initiate)
             if upload && mode == Mode::Block && mine(at, open) =>
         {
+            open.check &= crc;
             open.phase = Phase::BlockStart;
             Step::Goes
         }
-        (Response::EndBlockUpload { unused, .. }, Phase::BlockEnd | Phase::BlockData) if upload => {
-            open.end_of_blocks(unused);
+        (Response::EndBlockUpload { unused, crc }, Phase::BlockEnd | Phase::BlockData) if upload => {
+            open.end_of_blocks(unused, crc);
             Step::Goes
         }
         _ => Step::Foreign,

@@ -167,6 +167,9 @@ impl Teller for Json<'_> {
         if transfer.lacking {
             out.extend_from_slice(b",\"lacking\":true");
         }
+        if transfer.wrong_crc.is_some() {
+            out.extend_from_slice(b",\"crc_error\":true");
+        }
         key!(out, "outcome");
         put_word(
             out,

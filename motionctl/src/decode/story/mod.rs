@@ -59,6 +59,7 @@ pub(crate) struct Story<'a> {
 struct Told {
     data: Vec<u8>,
     outcome: Option<Outcome>,
+    faults: String,
     values: u32,
     again: u64,
 }

@@ -1,7 +1,9 @@
 //! SDO transfers, and frames of none.
 
+use core::fmt::Write as _;
+
 use canopen_master::sdo::message::{Content as Carried, Request, Response};
-use canopen_master::trace::{Content, Direction, Mode, Outcome, SdoFrame, Transfer, Way};
+use canopen_master::trace::{Content, Direction, Mode, Outcome, SdoFrame, Transfer, Way, WrongCrc};
 use canopen_master::{Address, ds402};
 use motion_io::capture::Time;
 
@@ -59,15 +61,21 @@ impl Story<'_> {
         let news =
             transfer.is_done() && !transfer.late && self.is_news(transfer.bus, node, at, &transfer.data);
         let told = self.objects.entry((transfer.bus, node, at, upload)).or_default();
-        let same = told.outcome == Some(transfer.outcome) && told.data == transfer.data && told.values > 0;
+        let faults = faults(transfer);
+        let same = told.outcome == Some(transfer.outcome)
+            && told.data == transfer.data
+            && told.faults == faults
+            && told.values > 0;
+        let enough = told.values >= VALUES && (faults.is_empty() || told.faults == faults);
         let writes_state = !upload && matches!(at.index, ds402::CONTROL_WORD | ds402::MODE);
-        if !news && !writes_state && (same || told.values >= VALUES) {
+        if !news && !writes_state && (same || enough) {
             told.again += 1;
             return;
         }
         told.values += 1;
         told.outcome = Some(transfer.outcome);
         told.data.clone_from(&transfer.data);
+        told.faults.clone_from(&faults);
         let more = if told.values == VALUES && !news && !writes_state { " (and so on)" } else { "" };
         let object = match transfer.late && at == Address::new(0, 0) {
             true => "an object that is not named".into(),
@@ -109,8 +117,17 @@ impl Story<'_> {
             }
             None => (ended, String::new()),
         };
-        self.say(time, bus, &who(node), &format!("{what}{since}{remark}{more}"));
+        self.say(time, bus, &who(node), &format!("{what}{faults}{since}{remark}{more}"));
     }
+}
+
+/// What is wrong with a transfer, to stand behind it.
+fn faults(transfer: &Transfer) -> String {
+    let mut faults = String::new();
+    if let Some(WrongCrc { found, computed }) = transfer.wrong_crc {
+        let _ = write!(faults, ", CRC WRONG: {found:04X}h came, {computed:04X}h computed");
+    }
+    faults
 }
 
 fn in_ms(from: Option<core::time::Duration>, to: Option<core::time::Duration>) -> String {
