@@ -240,6 +240,61 @@ fn a_wrong_crc_is_seen_where_both_sides_agreed_on_one_and_all_was_heard() {
 }
 
 #[test]
+fn a_size_that_is_not_the_one_announced_is_seen() {
+    let misannounced = |frames: &[&str]| {
+        let ended = Script::new().play(frames);
+        assert_eq!((ended.len(), ended[0].size, ended[0].is_done()), (1, 9, true), "{ended:?}");
+        ended[0].misannounced()
+    };
+    // 9 announced, 15 announced, nothing announced.
+    for (size, expected) in [(Some("09"), None), (Some("0F"), Some(15)), (None, None)] {
+        let begins = |id: &str, command: u8, sized: u8| match size {
+            Some(size) => format!("{id}#{:02X}002001{size}000000", command | sized),
+            None => format!("{id}#{command:02X}00200100000000"),
+        };
+        let uploaded = [
+            "601#4000200100000000",
+            &begins("581", 0x40, 1),
+            "601#6000000000000000",
+            "581#0031323334353637",
+            "601#7000000000000000",
+            "581#1B38390000000000",
+        ];
+        assert_eq!(misannounced(&uploaded), expected, "{uploaded:?}");
+        let downloaded = [
+            &begins("601", 0x20, 1),
+            "581#6000200100000000",
+            "601#0031323334353637",
+            "581#2000000000000000",
+            "601#1B38390000000000",
+            "581#3000000000000000",
+        ];
+        assert_eq!(misannounced(&downloaded), expected, "{downloaded:?}");
+        let block_uploaded = [
+            "601#A000200104000000",
+            &begins("581", 0xC0, 2),
+            "601#A300000000000000",
+            "581#0131323334353637",
+            "581#8238390000000000",
+            "601#A202040000000000",
+            "581#D500000000000000",
+            "601#A100000000000000",
+        ];
+        assert_eq!(misannounced(&block_uploaded), expected, "{block_uploaded:?}");
+        let block_downloaded = [
+            &begins("601", 0xC0, 2),
+            "581#A000200104000000",
+            "601#0131323334353637",
+            "601#8238390000000000",
+            "581#A202040000000000",
+            "601#D500000000000000",
+            "581#A100000000000000",
+        ];
+        assert_eq!(misannounced(&block_downloaded), expected, "{block_downloaded:?}");
+    }
+}
+
+#[test]
 fn a_block_upload_answered_as_a_plain_one() {
     let ended = Script::new().play(&["601#A400200104050000", "581#4300200101020304"]);
     assert_eq!(

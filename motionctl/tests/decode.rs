@@ -389,6 +389,40 @@ fn a_wrong_crc_of_a_block_transfer_is_told() {
     assert_eq!(errors, [None, Some(&json!(true)), Some(&json!(true))]);
 }
 
+/// There was no remark.
+#[test]
+fn a_size_that_is_not_the_one_announced_is_told() {
+    let log = log_of(&[
+        &[
+            "601#4000200100000000",
+            "581#4100200114000000",
+            "601#6000000000000000",
+            "581#0031323334353637",
+            "601#7000000000000000",
+            "581#1B38390000000000",
+        ],
+        &["601#2100200204000000", "581#6000200200000000", "601#0131323334353637", "581#2000000000000000"],
+        &["601#2100200300100000", "581#8000200312000706"],
+    ]);
+    expect_lines(
+        &story(&log, &[]),
+        &[
+            "0.006000  can0   node 1    read  2000h:01 = \"123456789\"  [segmented, 9 bytes in 5.0 ms], 20 bytes \
+             announced",
+            "0.010000  can0   node 1    write 2000h:02 = 31 32 33 34 35 36 37  [segmented, 7 bytes in 3.0 ms], 4 bytes \
+             announced",
+            "0.012000  can0   node 1    write 2000h:03 = nothing: REFUSED, data type does not match, length of \
+             service parameter too high (06070012h)  [segmented, 0 bytes in 1.0 ms], 4096 bytes announced",
+            "",
+            "12 frames: 6 sdo-request, 5 sdo-response, 1 sdo-abort",
+        ],
+    );
+    let objects = objects(log.as_bytes(), &[]);
+    let transfers = objects.iter().filter(|object| object["kind"] == "sdo-transfer");
+    let sizes: Vec<_> = transfers.map(|transfer| json!([transfer["size"], transfer["announced"]])).collect();
+    assert_eq!(json!(sizes), json!([[9, 20], [7, 4], [0, 4096]]));
+}
+
 #[test]
 fn times_since_the_frame_before_are_added_up() {
     let log = " (000.000000)  can0  080   [0]\n (000.000200)  can0  601   [8]  40 41 60 00 00 00 00 00\n \

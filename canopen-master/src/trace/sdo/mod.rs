@@ -136,6 +136,8 @@ pub struct Transfer {
     pub data: Vec<u8>,
     /// Bytes transferred.
     pub size: u64,
+    /// Bytes announced at its beginning, of one in segments or blocks.
+    pub announced: Option<u32>,
     /// Of a block transfer heard without a gap, of which both sides agreed on a CRC: it is wrong.
     pub wrong_crc: Option<WrongCrc>,
     /// How it ended.
@@ -153,6 +155,12 @@ impl Transfer {
     #[must_use]
     pub fn is_done(&self) -> bool {
         self.outcome == Outcome::Done
+    }
+
+    /// The bytes announced, where more or fewer came.
+    #[must_use]
+    pub fn misannounced(&self) -> Option<u32> {
+        self.announced.filter(|announced| u64::from(*announced) != self.size)
     }
 }
 
@@ -206,6 +214,7 @@ impl Open {
             lacking: false,
             data: Vec::new(),
             size: 0,
+            announced: None,
             wrong_crc: None,
             outcome: Outcome::Incomplete,
             frames: 0,

@@ -89,13 +89,18 @@ fn step_request(open: &mut Open, request: &Request) -> Step {
                 message::Content::Expedited { data, .. } => {
                     open.push(message::first(&data.padded(), data.len()));
                 }
-                message::Content::Segmented(_) => {}
+                message::Content::Segmented(size) => open.transfer.announced = size,
             }
             Step::Goes
         }
         (Request::InitiateUpload { .. }, _) => Step::Goes,
-        (Request::InitiateBlockUpload { crc, .. } | Request::InitiateBlockDownload { crc, .. }, _) => {
+        (Request::InitiateBlockUpload { crc, .. }, _) => {
             open.check = crc;
+            Step::Goes
+        }
+        (Request::InitiateBlockDownload { crc, size, .. }, _) => {
+            open.check = crc;
+            open.transfer.announced = size;
             Step::Goes
         }
         (Request::UploadSegment { toggle }, Phase::Segments { toggle: next, .. })
@@ -143,7 +148,8 @@ fn step_response(open: &mut Open, response: &Response) -> Step {
                 message::Content::Expedited { data, .. } => {
                     open.push(message::first(&data.padded(), data.len()));
                 }
-                message::Content::Segmented(_) => {
+                message::Content::Segmented(size) => {
+                    open.transfer.announced = size;
                     open.phase = Phase::Segments { toggle: false, asked: false, last: false };
                     return Step::Goes;
                 }
@@ -190,10 +196,11 @@ fn step_response(open: &mut Open, response: &Response) -> Step {
             Step::Goes
         }
         (Response::EndBlockDownload, Phase::BlockEnding) if !upload => Step::Ended(Outcome::Done),
-        (Response::InitiateBlockUpload { at, crc, .. }, Phase::Initiate)
+        (Response::InitiateBlockUpload { at, crc, size }, Phase::Initiate)
             if upload && mode == Mode::Block && mine(at, open) =>
         {
             open.check &= crc;
+            open.transfer.announced = size;
             open.phase = Phase::BlockStart;
             Step::Goes
         }

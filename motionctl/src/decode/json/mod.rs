@@ -167,6 +167,10 @@ impl Teller for Json<'_> {
         if transfer.lacking {
             out.extend_from_slice(b",\"lacking\":true");
         }
+        if let Some(announced) = transfer.misannounced() {
+            key!(out, "announced");
+            put_number(out, announced);
+        }
         if transfer.wrong_crc.is_some() {
             out.extend_from_slice(b",\"crc_error\":true");
         }

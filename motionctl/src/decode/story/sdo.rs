@@ -124,6 +124,9 @@ impl Story<'_> {
 /// What is wrong with a transfer, to stand behind it.
 fn faults(transfer: &Transfer) -> String {
     let mut faults = String::new();
+    if let Some(announced) = transfer.misannounced() {
+        let _ = write!(faults, ", {announced} bytes announced");
+    }
     if let Some(WrongCrc { found, computed }) = transfer.wrong_crc {
         let _ = write!(faults, ", CRC WRONG: {found:04X}h came, {computed:04X}h computed");
     }
