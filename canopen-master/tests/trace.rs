@@ -6,7 +6,7 @@ use core::time::Duration;
 use canopen_master::nmt::{Command, State};
 use canopen_master::sdo::AbortCode;
 use canopen_master::trace::{
-    Content, Direction, Kind, Lss, Mode, Outcome, PdoDirection, Tracer, Transfer, Way, WrongCrc,
+    Content, Direction, Kind, Lss, Mode, Outcome, PdoDirection, ShortFrame, Tracer, Transfer, Way, WrongCrc,
 };
 use canopen_master::{Address, Frame, NodeId, lss};
 use embedded_can::StandardId;
@@ -292,6 +292,29 @@ fn a_size_that_is_not_the_one_announced_is_seen() {
         ];
         assert_eq!(misannounced(&block_downloaded), expected, "{block_downloaded:?}");
     }
+}
+
+/// CiA 301, 7.2.4.3: SDO frames have 8 bytes.
+#[test]
+fn a_short_frame_is_taken_and_marked() {
+    let ended = Script::new().play(&[
+        "605#4000100000",
+        "585#4F00100007",
+        "605#4000100000000000",
+        "585#43001000920102",
+        "585#4300100092010200",
+        "605#4000100000000000",
+        "585#4F00100007",
+    ]);
+    let ended: Vec<_> = ended.iter().map(|transfer| (&transfer.data[..], transfer.short)).collect();
+    assert_eq!(
+        ended,
+        [
+            (&[7][..], Some(ShortFrame { way: Way::Request, len: 5 })),
+            (&[0x92, 1, 2, 0], None),
+            (&[7], Some(ShortFrame { way: Way::Response, len: 5 })),
+        ]
+    );
 }
 
 #[test]

@@ -423,6 +423,34 @@ fn a_size_that_is_not_the_one_announced_is_told() {
     assert_eq!(json!(sizes), json!([[9, 20], [7, 4], [0, 4096]]));
 }
 
+/// They were taken for proper ones.
+#[test]
+fn an_sdo_frame_that_is_too_short_is_told_as_short() {
+    let log = log_of(&[
+        &["605#4000100000", "585#4300100092010200"],
+        &["605#4041600000000000", "585#4B4160003706"],
+        &["605#4008100000", "605#4018100000000000"],
+        &["585#80181000", "585#8018100000000206", "585#4F18100004"],
+    ]);
+    expect_lines(
+        &story(&log, &[]),
+        &[
+            "0.002000  can0   node 5    read  1000h:00 device type = 00020192h, drive (CiA 402), request of 5 bytes, \
+             8 expected",
+            "0.004000  can0   node 5    read  6041h:00 status word = 0637h, operation enabled, target reached, answer \
+             of 6 bytes, 8 expected",
+            "0.005000  can0   node 5    read  1008h:00 device name: NO ANSWER, request of 5 bytes, 8 expected",
+            "0.007000  can0   node 5    SDO frame that fits no transfer: 80 18 10 00, answer of 4 bytes, 8 expected",
+            "0.008000  can0   node 5    read  1018h:00 identity, number of entries: REFUSED, object does not exist in \
+             the object dictionary (06020000h)",
+            "0.009000  can0   node 5    read  1018h:00 identity, number of entries = 4, answer to no request in the \
+             capture, answer of 5 bytes, 8 expected",
+            "",
+            "9 frames: 4 sdo-request, 4 sdo-response, 1 sdo-abort",
+        ],
+    );
+}
+
 #[test]
 fn times_since_the_frame_before_are_added_up() {
     let log = " (000.000000)  can0  080   [0]\n (000.000200)  can0  601   [8]  40 41 60 00 00 00 00 00\n \

@@ -22,7 +22,7 @@ use pdo::{Address, NodeId};
 
 pub use kind::{Kind, Lss};
 pub use mapping::{Field, Fields, Mapped, PdoDirection};
-pub use sdo::{Content, Direction, MAX_KEPT, Mode, Outcome, SdoFrame, Transfer, Way, WrongCrc};
+pub use sdo::{Content, Direction, MAX_KEPT, Mode, Outcome, SdoFrame, ShortFrame, Transfer, Way, WrongCrc};
 
 use crate::nmt::State;
 use bus::{BusState, Heard};

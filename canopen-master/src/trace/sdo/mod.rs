@@ -114,6 +114,23 @@ pub struct WrongCrc {
     pub computed: u16,
 }
 
+/// An SDO frame of fewer than the 8 bytes that every one has (CiA 301, 7.2.4.3).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct ShortFrame {
+    /// Which way it goes.
+    pub way: Way,
+    /// Bytes there are.
+    pub len: usize,
+}
+
+impl ShortFrame {
+    /// `None` of one that is long enough.
+    #[must_use]
+    pub const fn of(way: Way, data: &[u8]) -> Option<Self> {
+        if data.len() < 8 { Some(Self { way, len: data.len() }) } else { None }
+    }
+}
+
 /// An SDO transfer that has ended.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Transfer {
@@ -136,6 +153,8 @@ pub struct Transfer {
     pub data: Vec<u8>,
     /// Bytes transferred.
     pub size: u64,
+    /// The first of its frames that is too short; what it says is taken all the same.
+    pub short: Option<ShortFrame>,
     /// Bytes announced at its beginning, of one in segments or blocks.
     pub announced: Option<u32>,
     /// Of a block transfer heard without a gap, of which both sides agreed on a CRC: it is wrong.
@@ -214,6 +233,7 @@ impl Open {
             lacking: false,
             data: Vec::new(),
             size: 0,
+            short: None,
             announced: None,
             wrong_crc: None,
             outcome: Outcome::Incomplete,
@@ -340,6 +360,7 @@ impl Watch {
         let at = address(&content).or(if belongs == Step::Foreign { None } else { known });
         if let (Some(open), true) = (self.open.as_mut(), belongs != Step::Foreign) {
             open.transfer.frames += 1;
+            open.transfer.short = open.transfer.short.or(ShortFrame::of(way, data));
             open.transfer.ended = now;
         }
         // What looks like segments of a late transfer may turn out to be those of a block.

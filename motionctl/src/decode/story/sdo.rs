@@ -3,7 +3,9 @@
 use core::fmt::Write as _;
 
 use canopen_master::sdo::message::{Content as Carried, Request, Response};
-use canopen_master::trace::{Content, Direction, Mode, Outcome, SdoFrame, Transfer, Way, WrongCrc};
+use canopen_master::trace::{
+    Content, Direction, Mode, Outcome, SdoFrame, ShortFrame, Transfer, Way, WrongCrc,
+};
 use canopen_master::{Address, ds402};
 use motion_io::capture::Time;
 
@@ -48,7 +50,8 @@ impl Story<'_> {
                 format!("SDO frame that fits no transfer: {}", bytes(data))
             }
         };
-        self.say(time, bus, &who(node), &what);
+        let fault = ShortFrame::of(sdo.way, data).map(short_words).unwrap_or_default();
+        self.say(time, bus, &who(node), &format!("{what}{fault}"));
     }
 
     /// A transfer that has ended; `remark` stands behind it.
@@ -123,7 +126,7 @@ impl Story<'_> {
 
 /// What is wrong with a transfer, to stand behind it.
 fn faults(transfer: &Transfer) -> String {
-    let mut faults = String::new();
+    let mut faults = transfer.short.map(short_words).unwrap_or_default();
     if let Some(announced) = transfer.misannounced() {
         let _ = write!(faults, ", {announced} bytes announced");
     }
@@ -131,6 +134,11 @@ fn faults(transfer: &Transfer) -> String {
         let _ = write!(faults, ", CRC WRONG: {found:04X}h came, {computed:04X}h computed");
     }
     faults
+}
+
+fn short_words(frame: ShortFrame) -> String {
+    let what = if frame.way == Way::Request { "request" } else { "answer" };
+    format!(", {what} of {} bytes, 8 expected", frame.len)
 }
 
 fn in_ms(from: Option<core::time::Duration>, to: Option<core::time::Duration>) -> String {
