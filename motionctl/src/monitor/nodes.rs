@@ -150,7 +150,7 @@ impl<'a> View<'a> {
                 name: "heartbeat",
                 period: rhythm.period,
                 last: rhythm.last,
-                missed: rhythm.missed,
+                missed: rhythm.missed_by(now),
                 silent: is_silent(rhythm.last, rhythm.period, now),
             }),
             (_, Some(rhythm)) => Some(Control {
@@ -216,13 +216,14 @@ impl<'a> View<'a> {
             control.map_or("nothing seen", |control| control.name).into(),
             control.and_then(|control| control.period).map_or_else(String::new, in_ms),
             age(self.now, control.map_or(node.heard, |control| control.last)),
-            match control {
-                Some(control) if node.toggle_errors > 0 => {
-                    format!("{}, toggle {}", control.missed, node.toggle_errors)
-                }
-                Some(control) => control.missed.to_string(),
-                None => String::new(),
-            },
+            control.map_or_else(String::new, |control| {
+                let silent = if control.silent { ", silent" } else { "" };
+                let toggle = match node.toggle_errors {
+                    0 => String::new(),
+                    errors => format!(", toggle {errors}"),
+                };
+                format!("{}{silent}{toggle}", control.missed)
+            }),
             sdo,
             emergency,
         ]

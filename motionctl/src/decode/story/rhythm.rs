@@ -78,6 +78,12 @@ impl Rhythm {
         (period > 0 && gap.saturating_mul(10) > period.saturating_mul(25)).then_some(gap)
     }
 
+    /// How many did not come until now: those that are due since the last one, too, where it is silent.
+    pub(crate) fn missed_by(&self, now: Option<i64>) -> u64 {
+        let due = self.silence(now).zip(self.period).map_or(0, |(gap, period)| gap / period);
+        self.missed.saturating_add(u64::try_from(due).unwrap_or(0))
+    }
+
     /// It begins anew: what is between is no gap.
     pub(crate) const fn pause(&mut self) {
         self.paused = true;
@@ -130,6 +136,8 @@ mod tests {
         let rhythm = heard([0, 100, 200]);
         let silent = |time| rhythm.silence(Some(time));
         assert_eq!((silent(300), silent(450), silent(451), silent(100)), (None, None, Some(251), None));
+        let missed = |time| rhythm.missed_by(Some(time));
+        assert_eq!((missed(300), missed(451), missed(1000)), (0, 2, 8));
     }
 
     /// Gaps of all of time, again and again.
