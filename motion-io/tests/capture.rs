@@ -239,6 +239,55 @@ fn peak_trc_of_every_version() {
     assert!(damage[0].starts_with("line 2: a report of the hardware, no frame of the bus"), "{damage:?}");
 }
 
+/// Version 1.0 marks an error within its line, and a warning by its identifier.
+#[test]
+fn errors_of_the_oldest_peak_trc() {
+    let (_, frames, damage) = read(
+        b";$FILEVERSION=1.0\n     1)  1842  0008  4  ERROR 00 19 08 08\n     2)  1843  FFFFFFFF  4  00 00 00 04 BUSLIGHT\n",
+    );
+    let frames: Vec<_> = frames.iter().map(|(_, record)| record.frame).collect();
+    assert_eq!(frames, [frame(8, false, FrameKind::Error, &[0, 0x19, 8, 8])]);
+    assert_eq!(damage.len(), 1);
+    assert!(damage[0].starts_with("line 3: a report of the hardware, no frame of the bus"), "{damage:?}");
+}
+
+/// What was no frame vanished, but for what did not look like anything.
+#[test]
+fn an_asc_line_gives_a_frame_or_is_reported_unless_it_is_about_the_recording() {
+    let log = "date Sam Sep 30 15:06:13.191 2017\nbase hex  timestamps absolute\ninternal events logged\n\
+               // version 9.0.0\n;  time  can ident\nBegin Triggerblock Sam Sep 30 15:06:13.191 2017\n\
+               0.000000 Start of measurement\n\
+               0.000010 log trigger event\n\
+               0.015991 CAN 1 Status:chip status error passive - TxErr: 132 RxErr: 0\n\
+               1.015991 1  Statistic: D 0 R 0 XD 0 XR 0 E 0 O 0 B 0.00%\n\
+               2.501000 1 ErrorFrame\n\
+               2.501010 1 ErrorFrame ECC: 10100010\n\
+               2.501020 2 ErrorFrame Flags = 0xe CodeExt = 0x20a2 Code = 0x82 ID = 0 DLC = 0 Position = 5 Length = 11300\n\
+               2.501030 1 ErrorFrame ECC: 102\n\
+               2.6 1  OverloadFrame\n\
+               3.297743 1  J1939TP FEE3p        6    0  0   -   Rx   d 23 A0 0F\n\
+               4.0 L1  0x20  Rx 8 00 00 00 00 00 00 00 00\n\
+               4.1 ETH 1 Rx 4e:FFFFFFFFFFFF\n\
+               30.806898 CANFD   5 Tx ErrorFrame Not Acknowledge error, dominant error flag fffe c7\n\
+               End TriggerBlock\n";
+    let (_, frames, damage) = read(log.as_bytes());
+    let error = |data: &[u8]| frame(0, false, FrameKind::Error, data);
+    let frames: Vec<_> = frames.iter().map(|(_, record)| record.frame).collect();
+    assert_eq!(frames, [error(&[]), error(&[0b1010_0010]), error(&[]), error(&[])]);
+    let reasons: Vec<_> = damage.iter().map(|damage| damage.rsplit_once(": \"").unwrap().0).collect();
+    assert_eq!(
+        reasons,
+        [
+            "line 9: a status of the controller, no frame of the bus",
+            "line 14: 8 binary digits expected behind ECC:",
+            "line 15: an overload frame, which carries nothing",
+            "line 16: an event that is no frame of a CAN bus",
+            "line 17: an event that is no frame of a CAN bus",
+            "line 18: an event that is no frame of a CAN bus",
+        ]
+    );
+}
+
 #[test]
 fn column_texts() {
     expect(
@@ -319,6 +368,7 @@ fn samples() -> Vec<Record> {
         at(1_682_489_979_000_000_000, rx, remote(0x701, 1)),
         at(1_682_489_979_000_000_000, rx, frame(0x7FF, false, FD, &[0x5A; 64])),
         at(1_682_489_980_000_000_000, rx, frame(4, false, FrameKind::Error, &[0, 4, 0, 0, 0, 0, 0, 0])),
+        at(1_682_489_981_000_000_000, rx, frame(0, false, FrameKind::Error, &[0b1010_0010])),
     ]
 }
 
@@ -335,9 +385,10 @@ fn what_is_written_reads_back() {
         let keeps_direction = matches!(format, WriteFormat::Asc | WriteFormat::Trc);
         for ((bus, read), written) in frames.iter().zip(&samples()) {
             assert_eq!(read.time, written.time, "{format:?}");
-            // `.asc` knows of an error only that there was one.
+            // `.asc` knows of an error only that there was one, and Vector's code of it.
             if written.frame.kind == FrameKind::Error && format == WriteFormat::Asc {
-                assert_eq!(read.frame.kind, FrameKind::Error);
+                let code = if written.frame.len() == 1 { written.frame.data() } else { &[] };
+                assert_eq!(read.frame, frame(0, false, FrameKind::Error, code));
                 continue;
             }
             assert_eq!(read.frame, written.frame, "{format:?}");

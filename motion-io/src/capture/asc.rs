@@ -16,6 +16,9 @@ pub(super) struct Asc {
 }
 
 const MALFORMED: Parsed = Parsed::Damaged("channel, identifier, direction, d or r, length and data expected");
+const STATUS: Parsed = Parsed::Damaged("a status of the controller, no frame of the bus");
+const OVERLOAD: Parsed = Parsed::Damaged("an overload frame, which carries nothing");
+const OTHER: Parsed = Parsed::Damaged("an event that is no frame of a CAN bus");
 
 impl Asc {
     /// `timestamps relative` are those since the event before.
@@ -39,8 +42,12 @@ impl Asc {
                 record.bus = buses.find(channel);
                 self.classic(rest, record).unwrap_or(MALFORMED)
             }
-            // `Start of measurement`, `log trigger event`, …
-            _ if channel.first().is_some_and(u8::is_ascii_alphabetic) => Parsed::Nothing,
+            // `CAN 1 Status:chip status error active`.
+            b"CAN" => STATUS,
+            // `Start of measurement`, `log trigger event`: where the recording begins and ends.
+            b"Start" | b"log" | [b'/', b'/', ..] => Parsed::Nothing,
+            // LIN, FlexRay, Ethernet, variables of the tool.
+            _ if channel.first().is_some_and(u8::is_ascii_alphabetic) => OTHER,
             _ => MALFORMED,
         }
     }
@@ -56,7 +63,7 @@ impl Asc {
             b"date" | b"internal" | b"no" | b"Begin" | b"End" | b"begin" | b"end" | b"previous" => {
                 Parsed::Nothing
             }
-            [b'/', b'/', ..] => Parsed::Nothing,
+            [b'/', b'/', ..] | [b';', ..] => Parsed::Nothing,
             _ => Parsed::Damaged("no header that is known, and no time"),
         }
     }
@@ -64,13 +71,12 @@ impl Asc {
     fn classic(&self, rest: &[u8], record: &mut Record) -> Option<Parsed> {
         let (id, rest) = word(rest)?;
         match id {
-            b"ErrorFrame" => {
-                record.frame.id = 0;
-                record.frame.kind = FrameKind::Error;
-                record.frame.len = 0;
-                return Some(Parsed::Frame);
-            }
-            b"Statistic:" | b"OverloadFrame" | b"CAN" => return Some(Parsed::Nothing),
+            b"ErrorFrame" => return error_frame(rest, record),
+            b"OverloadFrame" => return Some(OVERLOAD),
+            // What the tool counts anew each second; nothing that happened on the bus.
+            b"Statistic:" => return Some(Parsed::Nothing),
+            // A transfer put together by the tool; its frames have lines of their own.
+            b"J1939TP" => return Some(OTHER),
             _ => {}
         }
         self.id(id, record)?;
@@ -108,10 +114,7 @@ impl Asc {
         record.direction = Some(direction(way)?);
         let (id, rest) = word(rest)?;
         if id == b"ErrorFrame" {
-            record.frame.id = 0;
-            record.frame.kind = FrameKind::Error;
-            record.frame.len = 0;
-            return Some(Parsed::Frame);
+            return error_frame(rest, record);
         }
         self.id(id, record)?;
         // A symbolic name may stand before the two flags.
@@ -162,6 +165,29 @@ impl Asc {
         record.frame.len = len as u8;
         Some(Parsed::Frame)
     }
+}
+
+/// What follows `ErrorFrame`: nothing, `ECC: 10100010`, or what is not read.
+fn error_frame(rest: &[u8], record: &mut Record) -> Option<Parsed> {
+    let frame = &mut record.frame;
+    frame.id = 0;
+    frame.kind = FrameKind::Error;
+    frame.len = 0;
+    let mut words = words(rest);
+    if words.next() == Some(b"ECC:") {
+        let Some(code) = words.next().and_then(binary) else {
+            return Some(Parsed::Damaged("8 binary digits expected behind ECC:"));
+        };
+        *frame.data.first_mut()? = code;
+        frame.len = 1;
+    }
+    Some(Parsed::Frame)
+}
+
+/// A byte of 8 binary digits.
+fn binary(text: &[u8]) -> Option<u8> {
+    let digits: &[u8; 8] = text.try_into().ok()?;
+    digits.iter().try_fold(0, |value, digit| matches!(digit, b'0' | b'1').then(|| value << 1 | digit & 1))
 }
 
 fn direction(text: &[u8]) -> Option<Direction> {

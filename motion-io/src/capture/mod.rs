@@ -7,7 +7,7 @@
 //! | read | |
 //! |---|---|
 //! | candump | `-l` logs and screen text: with or without interface, time, direction, ASCII column; remote, error and FD frames |
-//! | Vector `.asc` | classic and FD, `base hex` and `dec` |
+//! | Vector `.asc` | classic and FD, `base hex` and `dec`; the statistic lines of the tool give nothing |
 //! | PEAK `.trc` | 1.0, 1.1, 1.2, 1.3, 2.0, 2.1, and excerpts without a header |
 //! | IXXAT trace text | columns named by the header, quoted or not; column dumps `CAN1  67F Tx SD  8  2F …` |
 //! | pcap, pcapng | link types 227 (SocketCAN, identifier big-endian) and 113 (Linux cooked) |

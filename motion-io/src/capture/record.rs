@@ -75,8 +75,10 @@ pub enum FrameKind {
     Data,
     /// Classic remote frame.
     Remote,
-    /// Report of the controller or of the driver, with SocketCAN's error class as identifier where
-    /// the capture comes from there.
+    /// Report of the controller or of the driver, as the capture has it. SocketCAN: the error class as
+    /// identifier, 8 bytes (`linux/can/error.h`). PEAK 1.x: the type of error as identifier, then
+    /// direction, position and both error counters; 2.x: all 5 as data. Vector: the ECC register of the
+    /// SJA1000 as the one byte, or nothing.
     Error,
     /// CAN FD data frame, 0…64 bytes.
     Fd {
@@ -105,7 +107,7 @@ impl fmt::Display for FrameKind {
 /// A frame of a capture: classic, FD, or an error report.
 #[derive(Clone, Copy)]
 pub struct Frame {
-    /// 11 or 29 bits; of an error report the error class.
+    /// 11 or 29 bits; of an error report what [`FrameKind::Error`] says.
     pub id: u32,
     /// 29-bit identifier; never of an error report.
     pub extended: bool,

@@ -65,6 +65,7 @@ pub(super) struct Trc {
 }
 
 const MALFORMED: Parsed = Parsed::Damaged("the columns of this file's version expected");
+const ID: Parsed = Parsed::Damaged("an identifier of 11 or 29 bits expected");
 const STATUS: Parsed = Parsed::Damaged("a report of the hardware, no frame of the bus");
 
 impl Trc {
@@ -205,7 +206,9 @@ fn parse(
     if kind == FrameKind::Error {
         frame.id &= 0x1FFF_FFFF;
     } else if frame.id > if frame.extended { 0x1FFF_FFFF } else { 0x7FF } {
-        return Some(Parsed::Damaged("an identifier of 11 or 29 bits expected"));
+        // FFFFFFFF: a warning of version 1.0, which has no column for the type.
+        let is_warning = frame.id == u32::MAX;
+        return Some(if is_warning { STATUS } else { ID });
     }
     let is_fd = matches!(kind, FrameKind::Fd { .. });
     if is_fd && length_code {
@@ -216,10 +219,16 @@ fn parse(
     }
     frame.len = len as u8;
     let mut bytes = words(rest);
-    if kind == FrameKind::Remote || word(rest).is_some_and(|(first, _)| first == b"RTR") {
+    let first = word(rest).map(|(first, _)| first);
+    if kind == FrameKind::Remote || first == Some(b"RTR") {
         kind = FrameKind::Remote;
         bytes.next();
     } else {
+        // Version 1.0 marks errors so.
+        if first == Some(b"ERROR") {
+            kind = FrameKind::Error;
+            bytes.next();
+        }
         for room in frame.data.get_mut(..len)? {
             match bytes.next().and_then(hex_byte) {
                 Some(byte) => *room = byte,

@@ -152,7 +152,12 @@ fn write_asc(out: &mut impl Write, time: Time, channel: usize, record: &Record) 
     let mark = if frame.extended { "x" } else { "" };
     let len = frame.len();
     match frame.kind {
-        FrameKind::Error => return writeln!(out, "{time} {channel}  ErrorFrame"),
+        FrameKind::Error => {
+            return match frame.data() {
+                [code] => writeln!(out, "{time} {channel}  ErrorFrame  ECC: {code:08b}"),
+                _ => writeln!(out, "{time} {channel}  ErrorFrame"),
+            };
+        }
         FrameKind::Remote => {
             return writeln!(out, "{time} {channel}  {:X}{mark}  {}   r {len:X}", frame.id, way(record));
         }
