@@ -217,8 +217,14 @@ pub(crate) fn write_file<T>(
     drop(writer);
     #[cfg(unix)]
     {
-        use std::os::unix::fs::PermissionsExt;
-        let _ = file.as_file().set_permissions(std::fs::Permissions::from_mode(0o644));
+        use std::os::unix::fs::{MetadataExt, PermissionsExt, fchown};
+        // An older one goes on to belong to whom it belonged, and is read by whom it was.
+        let before = std::fs::metadata(&path).ok();
+        if let Some(before) = &before {
+            let _ = fchown(file.as_file(), Some(before.uid()), Some(before.gid()));
+        }
+        let mode = before.map_or(0o644, |before| before.mode());
+        let _ = file.as_file().set_permissions(std::fs::Permissions::from_mode(mode));
     }
     file.as_file().sync_all().map_err(|error| trouble(&error))?;
     file.persist(&path).map_err(|error| trouble(&error))?;

@@ -711,3 +711,69 @@ fn a_capture_without_a_frame_is_trouble_with_a_file() {
     bench.run(&["decode", "--format", "candump", "empty"]).ends(0).says("0 frames");
     bench.run(&["decode", "--eds", "5=a.eds", "--eds", "5=b.eds", "log"]).ends(5);
 }
+
+#[test]
+fn a_pdo_that_is_mapped_anew_is_told() {
+    let told = story(
+        "(1.0) can0 605#23001A0110004160\n(1.1) can0 585#60001A0100000000\n(1.2) can0 605#2F001A0001000000\n\
+         (1.3) can0 585#60001A0000000000\n(2.0) can0 185#37060000\n(2.1) can0 605#23001A0120006460\n\
+         (2.2) can0 585#60001A0100000000\n(2.3) can0 185#37060001\n(2.4) can0 185#37060002\n",
+        &[],
+    );
+    assert!(
+        told.contains("2.300000  can0   node 5    TPDO 1, mapped anew: position actual = 16778807"),
+        "{told}"
+    );
+}
+
+/// Frames of two interfaces that were not written in order, with times since 1970.
+#[test]
+fn times_since_1970_are_no_differences() {
+    let log: String = (0..50)
+        .map(|n| {
+            let at = 1_700_000_000.0 + f64::from(n) * 0.1;
+            format!("({:.6}) can0 701#05\n({:.6}) can1 701#05\n", at, at - 0.000_005)
+        })
+        .collect();
+    let told = story(log, &[]);
+    assert!(!told.contains("since the frame before"), "{told}");
+    assert!(
+        told.contains("can0 node 1 heartbeat, at last operational: 50 times, every 100.0 ms\n"),
+        "{told}"
+    );
+}
+
+#[test]
+fn a_name_of_a_bus_does_not_break_a_line() {
+    let mut packets = vec![0x0A, 0x0D, 0x0D, 0x0A, 28, 0, 0, 0, 0x4D, 0x3C, 0x2B, 0x1A, 1, 0, 0, 0];
+    packets.extend([0xFF; 8]);
+    packets.extend([28, 0, 0, 0]);
+    // Interface of link type 227 with the name "can\n".
+    packets.extend([1, 0, 0, 0, 32, 0, 0, 0, 227, 0, 0, 0, 0, 0, 0, 0, 2, 0, 4, 0]);
+    packets.extend(b"can\n");
+    packets.extend([0, 0, 0, 0, 32, 0, 0, 0]);
+    packets.extend([6, 0, 0, 0, 44, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 9, 0, 0, 0, 9, 0, 0, 0]);
+    packets.extend([0, 0, 7, 5, 1, 0, 0, 0, 5, 0, 0, 0, 44, 0, 0, 0]);
+    let told = story(packets, &[]);
+    assert!(told.contains("can·   node 5    is operational"), "{told}");
+}
+
+/// A bus that is listened to through a pipe.
+#[test]
+fn what_comes_through_a_pipe_is_told_at_once() {
+    use std::io::{BufRead as _, BufReader, Write as _};
+    use std::process::Stdio;
+    for (how, told) in [("--json", "\"kind\":\"heartbeat\""), ("--quiet", "is operational")] {
+        let bench = Bench::new();
+        // Without a given format the first 64 KiB are waited for, to recognise it.
+        let mut command = bench.command(&[how, "decode", "--format", "candump", "-"]);
+        let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
+        let mut input = child.stdin.take().unwrap();
+        input.write_all(b"(1.0) can0 705#05\n").unwrap();
+        let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
+        let line = lines.next().unwrap().unwrap();
+        assert!(line.contains(told), "{line}");
+        drop(input);
+        assert!(child.wait().unwrap().success());
+    }
+}

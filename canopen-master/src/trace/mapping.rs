@@ -102,11 +102,10 @@ impl<'a> Fields<'a> {
         Self { objects: objects.iter(), data, bit: 0 }
     }
 
-    /// Bytes that the objects from here on take; a frame may have fewer.
+    /// The objects that are mapped from here on, also those that the frame is too short for.
     #[must_use]
-    pub fn expected_len(&self) -> usize {
-        let bits: usize = self.objects.clone().map(|object| usize::from(object.bits)).sum();
-        (self.bit + bits).div_ceil(8)
+    pub fn objects(&self) -> &'a [Mapped] {
+        self.objects.as_slice()
     }
 }
 
@@ -146,8 +145,7 @@ mod tests {
         let data = [0b1010_1101, 0xFF, 0x34, 0x12, 1, 2];
         let values: Vec<u64> = Fields::new(&objects, &data).map(|field| field.raw).collect();
         assert_eq!(values, [5, 0x1FF5, 0x1234]);
-        assert_eq!(Fields::new(&objects, &data).expected_len(), 8);
-        assert_eq!(Fields::new(&[], &data).expected_len(), 0);
+        assert_eq!(Fields::new(&objects, &data).objects(), objects);
     }
 
     #[test]

@@ -140,6 +140,13 @@ impl<R: Read> Reader<R> {
         self.buses.name(bus)
     }
 
+    /// Whether all that was read has been given: [`next`](Self::next) waits for the source.
+    #[must_use]
+    #[inline]
+    pub fn is_drained(&self) -> bool {
+        self.input.at_hand().is_empty()
+    }
+
     /// The frame that [`next`](Self::next) gave last.
     #[must_use]
     #[inline]

@@ -16,7 +16,7 @@ use crate::can::cli::CanLine;
 use crate::can::session::{answer_time, connect, endpoint, gone, node_id};
 use crate::cli::Global;
 use crate::exit::Exit;
-use crate::output::{Output, writable, write_beside};
+use crate::output::{Output, apart, writable, write_beside};
 use tell::Teller;
 
 #[derive(Debug, Clone, Args)]
@@ -36,6 +36,9 @@ pub(crate) struct Conform {
 
 pub(crate) fn run(out: &Output, global: &Global, arguments: &Conform) -> Result<(), Exit> {
     let name = arguments.eds.display().to_string();
+    if let Some(junit) = &arguments.junit {
+        apart(("--eds", &arguments.eds), ("--junit", junit))?;
+    }
     let bytes = crate::eds::bytes(&arguments.eds)?;
     let device = eds::read(&bytes).map_err(|error| Exit::file(&name, &error))?.device;
     if global.dry_run {

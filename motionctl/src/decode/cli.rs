@@ -30,7 +30,8 @@ pub(crate) struct Reading {
     /// 101h to 10Eh are channels of CAN Link
     #[arg(long)]
     pub(crate) can_link: bool,
-    /// Format of a capture, in place of the one that the content shows
+    /// Format of a capture, in place of the one that the content shows; what then comes through a pipe is
+    /// told at once
     #[arg(long, value_enum)]
     pub(crate) format: Option<FormatName>,
     /// What times of CAN captures are since, in place of what the content shows

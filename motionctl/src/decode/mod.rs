@@ -269,9 +269,14 @@ fn decode_can<R: Read>(
             Ok(Some(Item::Frame(_))) => {}
         }
         ear.hear_next(&reader, teller, totals);
-        if teller.text().len() >= BLOCK {
+        // Who listens to a bus through a pipe sees what it does when it does it.
+        let drained = reader.is_drained();
+        if drained || teller.text().len() >= BLOCK {
             stdout.write_all(teller.text())?;
             teller.text().clear();
+        }
+        if drained {
+            stdout.flush()?;
         }
     };
     ear.finish(teller);

@@ -11,6 +11,7 @@ use pdo::CobId;
 
 use super::linmot;
 use crate::exit::Exit;
+use crate::output::counted;
 
 /// What is known of the nodes' objects.
 #[derive(Debug, Default)]
@@ -171,7 +172,12 @@ impl Names {
     /// A value in words.
     pub(crate) fn words(&self, node: NodeId, at: Address, data: &[u8]) -> String {
         if let Some(words) = special(at, data) {
-            return words;
+            return match special_len(at.index) {
+                Some(len) if len != data.len() => {
+                    format!("{words}, in {}", counted(data.len(), "byte", "bytes"))
+                }
+                _ => words,
+            };
         }
         if self.is_linmot(node)
             && let Some(words) = linmot::value(at, data)
@@ -212,6 +218,15 @@ pub(crate) fn bytes(data: &[u8]) -> String {
         0 => "nothing".into(),
         len if len > MOST => format!("{} … ({len} bytes)", shown.join(" ")),
         _ => shown.join(" "),
+    }
+}
+
+/// Bytes of the objects among those whose bits have a meaning that every device has in this length.
+const fn special_len(index: u16) -> Option<usize> {
+    match index {
+        ds402::CONTROL_WORD | ds402::STATUS_WORD => Some(2),
+        ds402::MODE | ds402::MODE_DISPLAY => Some(1),
+        _ => None,
     }
 }
 
@@ -338,6 +353,7 @@ mod tests {
         for (at, data, words) in [
             (Address::new(0x6041, 0), &[0x37, 0x06][..], "0637h, operation enabled, target reached"),
             (Address::new(0x6040, 0), &[0x0F, 0x00], "000Fh, enable operation"),
+            (Address::new(0x6040, 0), &[0x06, 0x00, 0x01, 0x00], "0006h, shutdown, in 4 bytes"),
             (Address::new(0x6060, 0), &[8], "8 (csp)"),
             (Address::new(0x1000, 0), &[0x92, 0x01, 0x02, 0x00], "00020192h, drive (CiA 402)"),
             (Address::new(0x1A00, 1), &[0x10, 0x00, 0x41, 0x60], "6041h:00 status word, 16 bits"),

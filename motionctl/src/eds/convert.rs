@@ -50,7 +50,10 @@ pub(super) fn run(
     let mut device = reading.device.clone();
     configure(out, &mut device, changes)?;
     if !kind.is_configuration() && device.is_configuration() {
-        if Kind::of(&input.file) == Some(kind) {
+        // Where the name says nothing, a description is what has no settings of a node.
+        let format = matches!(kind, Kind::Xdd) == (reading.source.format == Format::Xdd);
+        let same = Kind::of(&input.file).map_or(format && device.commissioning.is_empty(), |own| own == kind);
+        if same {
             out.remark(
                 "the file holds what is configured in a device, which a description should not: it is kept",
             );

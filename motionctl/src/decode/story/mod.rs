@@ -15,7 +15,7 @@ use std::io::Write;
 
 use canopen_master::ds402::StatusWord;
 use canopen_master::nmt::State;
-use canopen_master::trace::{Kind, Outcome, PdoDirection, Tracer, Transfer};
+use canopen_master::trace::{Kind, Mapped, Outcome, PdoDirection, Tracer, Transfer};
 use canopen_master::{Address, NodeId, ds402};
 use motion_io::capture::{Frame, FrameKind, Record, Time};
 
@@ -48,6 +48,8 @@ pub(crate) struct Story<'a> {
     objects: BTreeMap<(u16, NodeId, Address, bool), Told>,
     /// `None`: a status word that shows no state.
     drives: BTreeMap<(u16, NodeId), Option<ds402::State>>,
+    /// Of PDOs.
+    mappings: BTreeMap<Cycle, Vec<Mapped>>,
     /// PDOs with fewer bytes than their mapping has.
     short: BTreeSet<Cycle>,
     silent: BTreeMap<(u16, NodeId), u32>,
@@ -84,6 +86,7 @@ impl<'a> Story<'a> {
             cycles: BTreeMap::new(),
             objects: BTreeMap::new(),
             drives: BTreeMap::new(),
+            mappings: BTreeMap::new(),
             short: BTreeSet::new(),
             silent: BTreeMap::new(),
             last: Last::default(),
@@ -114,7 +117,7 @@ impl<'a> Story<'a> {
     fn say(&mut self, time: Option<i64>, bus: Option<&str>, who: &str, what: &str) {
         let mut text = String::new();
         if let Some(bus) = bus {
-            let _ = write!(text, "{bus:<6} ");
+            let _ = write!(text, "{:<6} ", one_line(bus));
         }
         let _ = write!(text, "{who:<9} {what}");
         if text == self.last.text {
@@ -160,28 +163,34 @@ impl<'a> Story<'a> {
         if !changed {
             return;
         }
-        let (expected, len) = (tracer.mapped(number, kind, frame.data()).expected_len(), frame.len());
+        let objects = tracer.mapped(number, kind, frame.data()).objects();
+        let bits: usize = objects.iter().map(|object| usize::from(object.bits)).sum();
+        let (expected, len) = (bits.div_ceil(8), frame.len());
         if len >= expected {
             self.short.remove(&cycle);
         } else if self.short.insert(cycle) {
             let what = format!("{name} {pdo} has {}, its mapping {expected}", counted(len, "byte", "bytes"));
             self.say(time, bus, &who(node), &what);
         }
+        let mapping = self.mappings.entry(cycle).or_default();
+        let other = !first && *mapping != objects;
+        objects.clone_into(mapping);
         let mut fields = Vec::new();
-        let mut mapped = false;
         for field in tracer.mapped(number, kind, frame.data()) {
-            mapped = true;
             let at = field.object.address();
             let raw = field.raw.to_le_bytes();
             let raw = raw.get(..usize::from(field.object.bits).div_ceil(8)).unwrap_or(&raw);
-            if self.is_news(number, node, at, raw) || self.moves(number, node, at, raw) || first {
+            if self.is_news(number, node, at, raw) || self.moves(number, node, at, raw) || first || other {
                 fields.push(format!("{} = {}", self.names.short(node, at), self.names.words(node, at, raw)));
             }
         }
-        let news = first || !fields.is_empty();
-        if news {
-            let fields = if mapped { fields.join("; ") } else { bytes(frame.data()) };
-            let begins = if first { " begins" } else { "" };
+        if first || other || !fields.is_empty() {
+            let fields = if fields.is_empty() { bytes(frame.data()) } else { fields.join("; ") };
+            let begins = match (first, other) {
+                (true, _) => " begins",
+                (false, true) => ", mapped anew",
+                (false, false) => "",
+            };
             self.say(time, bus, &who(node), &format!("{name} {pdo}{begins}: {fields}"));
         }
     }
@@ -257,9 +266,14 @@ impl<'a> Story<'a> {
             Kind::CanLink { channel } => format!(" channel {channel}"),
             _ => String::new(),
         };
-        let bus = bus.unwrap_or("");
+        let bus = one_line(bus.unwrap_or(""));
         let _ = writeln!(self.out, "{time:>12}  {bus:<6}   · {:?}  {name}{channel}{copy}", record.frame);
     }
+}
+
+/// The name of a bus without line ends; what else could do harm is escaped where it is written.
+fn one_line(name: &str) -> String {
+    name.replace(['\n', '\r'], "·")
 }
 
 fn seconds(nanos: i64) -> String {

@@ -7,7 +7,7 @@ use canopen_master::trace::PdoDirection;
 
 use super::super::Ear;
 use super::rhythm::Rhythm;
-use super::{Story, seconds};
+use super::{Story, one_line, seconds};
 
 /// Something that repeats itself; the number of its bus first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -109,7 +109,7 @@ impl Story<'_> {
                 what = format!("{what}, at last {state}");
             }
             let name = ear.bus_name(cycle.bus()).filter(|_| ear.has_several_buses());
-            let bus = name.map_or_else(String::new, |name| format!("{name} "));
+            let bus = name.map_or_else(String::new, |name| format!("{} ", one_line(name)));
             let period = period(&count.rhythm);
             let changes = match count.changes {
                 _ if !cycle.carries() => String::new(),
