@@ -81,6 +81,34 @@ fn frames_and_transfers_of_a_log() {
     );
 }
 
+/// Of every report a class was told, which only SocketCAN has, and that as a number.
+#[test]
+fn error_reports_are_told_as_their_capture_means_them() {
+    let told = |log: &str, words: &str| {
+        let told = story(log, &[]);
+        assert!(told.contains(&format!("bus       {words}\n")), "{told}");
+    };
+    told(
+        "(0.1) can0 20000204#0004000000006000\n",
+        "error report: controller: receive error warning; error counters: transmit 96, receive 0",
+    );
+    told(
+        "base hex  timestamps absolute\n 2.5 1 ErrorFrame ECC: 10100010\n",
+        "error frame of the bus: stuff error while receiving at bits 28 to 21 of the identifier (ECC 10100010)",
+    );
+    told("base hex  timestamps absolute\n 2.5 1 ErrorFrame\n", "error frame of the bus");
+    told(
+        ";$FILEVERSION=2.1\n;$COLUMNS=N,O,T,B,I,d,R,l,D\n 1 1060.1 ER 2 - Rx - 5  04 00 02 00 00\n",
+        "error frame of the bus: stuff error while sending at bits 28 to 21 of the identifier; \
+         error counters: transmit 0, receive 0",
+    );
+    told(
+        ";$FILEVERSION=1.3\n 1) 1060.1 1 Error 0008 - 4  01 19 08 00\n",
+        "error frame of the bus: other error while receiving at the acknowledge slot; \
+         error counters: transmit 0, receive 8",
+    );
+}
+
 #[test]
 fn a_screen_dump_has_no_times_and_its_direction_is_no_bus() {
     expect(

@@ -4,6 +4,7 @@
 //! guarding, a value polled again and again) is told when it begins and when it changes, and counted
 //! at the end.
 
+mod errors;
 mod repeats;
 mod rhythm;
 mod sdo;
@@ -327,12 +328,7 @@ impl Teller for Story<'_> {
         let frame = &record.frame;
         if frame.classic().is_none() {
             if frame.kind == FrameKind::Error {
-                self.say(
-                    time,
-                    bus,
-                    "bus",
-                    &format!("error report: class {:X}h, {}", frame.id, bytes(frame.data())),
-                );
+                self.say(time, bus, "bus", &errors::error_words(frame.id, frame.data()));
             } else if self.cycle(Cycle::Identifier(number, frame.id, frame.extended), time, frame.data()).0 {
                 self.say(time, bus, "bus", &format!("CAN frame {frame:?}"));
             }
