@@ -334,6 +334,12 @@ fn conform_asks_first_whether_its_report_can_be_written() {
         assert_eq!((status, told.as_str()), (Some(5), ""), "{error}");
         assert!(error.starts_with(&format!("error: {path}: {why}")), "{error}");
     }
+    // Its own device file would be lost.
+    let file = bench.directory.path().join("io.eds");
+    let before = std::fs::read(&file).unwrap();
+    let (status, _, error) = conform(&bench, "5", "io.eds", &["--junit", "io.eds"]);
+    assert_eq!(status, Some(2), "{error}");
+    assert_eq!(std::fs::read(&file).unwrap(), before);
 }
 
 /// Nothing was written then, so that an older report was taken for that of this run.

@@ -805,3 +805,24 @@ fn what_comes_through_a_pipe_is_told_at_once() {
         assert!(child.wait().unwrap().success());
     }
 }
+
+/// However often an object was read before.
+#[test]
+fn a_transfer_that_fails_is_told_after_many_that_did_not() {
+    let mut log = String::new();
+    for at in 0..8 {
+        log.push_str(&format!(
+            "(1.{at}0) can0 605#4041600000000000\n(1.{at}5) can0 585#4B4160003{at}060000\n"
+        ));
+    }
+    for at in 0..6 {
+        log.push_str(&format!(
+            "(2.{at}0) can0 605#4041600000000000\n(2.{at}5) can0 585#8041600000000{at}08\n"
+        ));
+    }
+    log.push_str("(3.0) can0 605#4041600000000000\n(4.0) can0 605#4041600000000000\n");
+    let told = story(log, &[]);
+    let refused = told.lines().filter(|line| line.contains("REFUSED")).count();
+    assert_eq!(refused, 4, "{told}");
+    assert!(told.contains("(and so on)"), "{told}");
+}

@@ -203,3 +203,31 @@ fn a_file_that_is_no_device_file_has_one_status_everywhere() {
     }
     assert!(!bench.path("out.dcf").exists());
 }
+
+/// What is read through a pipe, or from a file of any name, is what the content says.
+#[test]
+fn a_description_without_a_name_keeps_what_it_holds() {
+    let bench = Bench::new();
+    let odd = EDS.replace(
+        "AccessType=rw\r\nDefaultValue=0\r\n",
+        "AccessType=rw\r\nDefaultValue=0\r\nParameterValue=5\r\n",
+    );
+    std::fs::write(bench.path("odd.txt"), &odd).unwrap();
+    bench.run(&["eds", "convert", "odd.txt", "same.eds"]).ends(0).says("it is kept");
+    assert_eq!(std::fs::read_to_string(bench.path("same.eds")).unwrap(), odd);
+    std::fs::write(bench.path("dcf.txt"), odd + "[DeviceComissioning]\r\nNodeID=5\r\n").unwrap();
+    bench.run(&["eds", "convert", "dcf.txt", "other.eds"]).ends(0).says("1 configured values");
+}
+
+#[cfg(unix)]
+#[test]
+fn an_output_that_was_there_keeps_who_may_read_it() {
+    use std::os::unix::fs::PermissionsExt as _;
+    let bench = bench();
+    let mode = |name: &str| std::fs::metadata(bench.path(name)).unwrap().permissions().mode() & 0o777;
+    std::fs::write(bench.path("a.xdd"), "").unwrap();
+    std::fs::set_permissions(bench.path("a.xdd"), std::fs::Permissions::from_mode(0o640)).unwrap();
+    bench.run(&["eds", "convert", "a.eds", "a.xdd"]).ends(0);
+    bench.run(&["eds", "convert", "a.eds", "new.xdd"]).ends(0);
+    assert_eq!((mode("a.xdd"), mode("new.xdd")), (0o640, 0o644));
+}

@@ -64,6 +64,8 @@ struct Told {
     outcome: Option<Outcome>,
     faults: String,
     values: u32,
+    /// Transfers that went wrong.
+    failures: u32,
     again: u64,
 }
 

@@ -68,18 +68,22 @@ impl Story<'_> {
         let same = told.outcome == Some(transfer.outcome)
             && told.data == transfer.data
             && told.faults == faults
-            && told.values > 0;
-        let enough = told.values >= VALUES && (faults.is_empty() || told.faults == faults);
+            && told.values + told.failures > 0;
+        // What goes wrong is counted by itself: any number of good ones do not hide it.
+        let failed = !transfer.is_done() || !faults.is_empty();
+        let count = if failed { &mut told.failures } else { &mut told.values };
+        let enough = *count >= VALUES;
         let writes_state = !upload && matches!(at.index, ds402::CONTROL_WORD | ds402::MODE);
         if !news && !writes_state && (same || enough) {
             told.again += 1;
             return;
         }
-        told.values += 1;
+        *count += 1;
+        let last = *count == VALUES && !news && !writes_state;
         told.outcome = Some(transfer.outcome);
         told.data.clone_from(&transfer.data);
         told.faults.clone_from(&faults);
-        let more = if told.values == VALUES && !news && !writes_state { " (and so on)" } else { "" };
+        let more = if last { " (and so on)" } else { "" };
         let object = match transfer.late && at == Address::new(0, 0) {
             true => "an object that is not named".into(),
             false => self.names.object(node, at),
