@@ -479,6 +479,45 @@ fn an_sdo_frame_that_is_too_short_is_told_as_short() {
     );
 }
 
+/// It was an "answer to no request in the capture". The traffic is that of a drive that starts slowly
+/// (ros2_canopen, issue 36).
+#[test]
+fn an_answer_after_the_client_has_given_up_is_told_as_late() {
+    let log = log_of(&[
+        &["602#4000100000000000", "602#8000100000000405", "582#4300100092010200"],
+        &["602#2B17100000000000", "602#8017100000000405", "582#6017100000000000"],
+        &["602#4008100000000000", "602#8008100000000405", "582#4108100009000000", "582#8008100000000405"],
+        &["602#4000100000000000", "582#4300100092010200", "582#4300100092010200"],
+    ]);
+    expect_lines(
+        &story(&log, &[]),
+        &[
+            "0.002000  can0   node 2    read  1000h:00 device type: the client gave up, SDO protocol timed out \
+             (05040000h)",
+            "0.003000  can0   node 2    read  1000h:00 device type = 00020192h, drive (CiA 402), late answer: the \
+             client had given up 1.0 ms before",
+            "0.005000  can0   node 2    write 1017h:00 heartbeat period in ms: the client gave up, SDO protocol timed out \
+             (05040000h)",
+            "0.006000  can0   node 2    write 1017h:00 heartbeat period in ms is confirmed: late answer: the client \
+             had given up 1.0 ms before",
+            "0.008000  can0   node 2    read  1008h:00 device name: the client gave up, SDO protocol timed out \
+             (05040000h)",
+            "0.009000  can0   node 2    begins a transfer of 1008h:00 device name: late answer: the client had given \
+             up 1.0 ms before",
+            "0.010000  can0   node 2    ABORTS 1008h:00 device name, SDO protocol timed out (05040000h): late answer: \
+             the client had given up 2.0 ms before",
+            "0.012000  can0   node 2    read  1000h:00 device type = 00020192h, drive (CiA 402)",
+            "0.013000  can0   node 2    read  1000h:00 device type = 00020192h, drive (CiA 402), answer to no request \
+             in the capture",
+            "",
+            "13 frames: 4 sdo-request, 5 sdo-response, 4 sdo-abort",
+        ],
+    );
+    let without_times =
+        story("can0 602#4000100000000000\ncan0 602#8000100000000405\ncan0 582#4300100092010200\n", &[]);
+    assert!(without_times.contains(", late answer: the client had given up before\n"), "{without_times}");
+}
+
 #[test]
 fn times_since_the_frame_before_are_added_up() {
     let log = " (000.000000)  can0  080   [0]\n (000.000200)  can0  601   [8]  40 41 60 00 00 00 00 00\n \

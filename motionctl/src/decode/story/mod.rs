@@ -46,6 +46,8 @@ pub(crate) struct Story<'a> {
     /// Time of the line told last.
     latest: Option<i64>,
     cycles: BTreeMap<Cycle, Count>,
+    /// When the client last gave up on an object.
+    given_up: BTreeMap<(u16, NodeId, Address), Option<core::time::Duration>>,
     objects: BTreeMap<(u16, NodeId, Address, bool), Told>,
     /// `None`: a status word that shows no state.
     drives: BTreeMap<(u16, NodeId), Option<ds402::State>>,
@@ -87,6 +89,7 @@ impl<'a> Story<'a> {
             newest: None,
             latest: None,
             cycles: BTreeMap::new(),
+            given_up: BTreeMap::new(),
             objects: BTreeMap::new(),
             drives: BTreeMap::new(),
             mappings: BTreeMap::new(),

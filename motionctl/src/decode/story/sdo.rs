@@ -1,6 +1,7 @@
 //! SDO transfers, and frames of none.
 
 use core::fmt::Write as _;
+use core::time::Duration;
 
 use canopen_master::sdo::message::{Content as Carried, Request, Response};
 use canopen_master::trace::{
@@ -24,24 +25,31 @@ impl Story<'_> {
         data: &[u8],
     ) {
         let node = sdo.node;
+        let late = self.late(number, sdo, time);
+        let answer = late.as_deref().unwrap_or("answer to no request in the capture");
         let what = match sdo.content {
             Content::Response(Response::InitiateUpload { at, content: Carried::Expedited { data, .. } }) => {
                 let object = self.names.object(node, at);
                 let value = self.names.words(node, at, data.padded().get(..data.len()).unwrap_or(&[]));
-                format!("read  {object} = {value}, answer to no request in the capture")
+                format!("read  {object} = {value}, {answer}")
             }
             Content::Response(Response::InitiateDownload { at }) => {
-                format!(
-                    "write {} is confirmed: answer to no request in the capture",
-                    self.names.object(node, at)
-                )
+                format!("write {} is confirmed: {answer}", self.names.object(node, at))
             }
             Content::Response(Response::Abort { at, code }) => {
-                format!("ABORTS {}, {code}: no transfer of it is open", self.names.object(node, at))
+                let why = late.as_deref().unwrap_or("no transfer of it is open");
+                format!("ABORTS {}, {code}: {why}", self.names.object(node, at))
             }
             Content::Request(Request::Abort { at, code }) => {
                 let object = self.names.object(node, at);
                 format!("{object}: the client ABORTS, {code}: no transfer of it is open")
+            }
+            Content::Response(
+                Response::InitiateUpload { at, .. }
+                | Response::InitiateBlockUpload { at, .. }
+                | Response::InitiateBlockDownload { at, .. },
+            ) if late.is_some() => {
+                format!("begins a transfer of {}: {answer}", self.names.object(node, at))
             }
             _ => {
                 if !self.cycle(Cycle::Stray(number, node), time, &[]).0 {
@@ -54,12 +62,27 @@ impl Story<'_> {
         self.say(time, bus, &who(node), &format!("{what}{fault}"));
     }
 
+    /// Of an answer to a request that the client has given up: how late it is.
+    fn late(&self, bus: u16, sdo: &SdoFrame, time: Option<i64>) -> Option<String> {
+        let at = sdo.at.filter(|_| sdo.way == Way::Response)?;
+        let given_up = self.given_up.get(&(bus, sdo.node, at))?;
+        let now = time.filter(|time| *time >= 0).map(|time| Time(time).since_zero());
+        let before = ms(*given_up, now).map_or_else(String::new, |ms| format!(" {ms}"));
+        Some(format!("late answer: the client had given up{before} before"))
+    }
+
     /// A transfer that has ended; `remark` stands behind it.
     pub(super) fn tell(&mut self, transfer: &Transfer, bus: Option<&str>, remark: &str) {
         let Transfer { node, at, .. } = *transfer;
         if transfer.is_done() {
             self.names.heard(node, at, &transfer.data);
         }
+        match transfer.outcome {
+            Outcome::Aborted { by: Way::Request, .. } => {
+                self.given_up.insert((transfer.bus, node, at), transfer.ended)
+            }
+            _ => self.given_up.remove(&(transfer.bus, node, at)),
+        };
         let upload = transfer.direction == Direction::Upload;
         let news =
             transfer.is_done() && !transfer.late && self.is_news(transfer.bus, node, at, &transfer.data);
@@ -94,7 +117,9 @@ impl Story<'_> {
             Mode::Expedited => String::new(),
             mode => {
                 let mode = if mode == Mode::Block { "block" } else { "segmented" };
-                format!("  [{mode}, {} bytes{}]", transfer.size, in_ms(transfer.began, transfer.ended))
+                let time =
+                    ms(transfer.began, transfer.ended).map_or_else(String::new, |ms| format!(" in {ms}"));
+                format!("  [{mode}, {} bytes{time}]", transfer.size)
             }
         };
         let what = match transfer.outcome {
@@ -145,9 +170,8 @@ fn short_words(frame: ShortFrame) -> String {
     format!(", {what} of {} bytes, 8 expected", frame.len)
 }
 
-fn in_ms(from: Option<core::time::Duration>, to: Option<core::time::Duration>) -> String {
-    match from.zip(to).and_then(|(from, to)| to.checked_sub(from)) {
-        Some(time) if !time.is_zero() => format!(" in {:.1} ms", time.as_secs_f64() * 1e3),
-        _ => String::new(),
-    }
+/// Milliseconds from one time to another, where they differ.
+fn ms(from: Option<Duration>, to: Option<Duration>) -> Option<String> {
+    let time = to?.checked_sub(from?).filter(|time| !time.is_zero())?;
+    Some(format!("{:.1} ms", time.as_secs_f64() * 1e3))
 }
