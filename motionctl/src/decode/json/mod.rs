@@ -77,6 +77,7 @@ impl<'a> Json<'a> {
 }
 
 impl Teller for Json<'_> {
+    #[inline]
     fn frame(
         &mut self,
         record: &Record,
