@@ -60,7 +60,7 @@ impl Rule {
     #[must_use]
     pub const fn clause(self, format: Format) -> &'static str {
         match (format, self) {
-            (Format::Eds, _) | (Format::Xdd, Self::PdoMapping) => self.eds_clause(),
+            (Format::Eds, _) | (Format::Xdd, Self::PdoMapping | Self::Standard) => self.eds_clause(),
             (Format::Xdd, Self::Mandatory) => "CiA 301, 7.5.2",
             (Format::Xdd, _) => "CiA 311",
         }
@@ -129,6 +129,9 @@ rules! {
     Modules = "modules", Error, "CiA 306-1, 8";
     /// A PDO maps an object that is not there, not mappable, of another length, or more than 64 bits.
     PdoMapping = "pdo-mapping", Error, "CiA 301, 7.5.2";
+    /// A communication object of another type than the standard gives it, or with an identifier that it
+    /// must not have.
+    Standard = "standard", Warning, "CiA 301, 7.5.2";
     /// An XDD that is not as the schema says.
     Xdd = "xdd", Error, "CiA 311";
 }

@@ -3,6 +3,7 @@
 mod header;
 mod objects;
 mod pdo;
+mod standard;
 
 use alloc::collections::BTreeMap;
 use alloc::string::String;
@@ -45,6 +46,7 @@ pub fn check(reading: &Reading) -> Vec<Diagnostic> {
 fn contents(device: &Device, places: &Places<'_>, findings: &mut Findings) {
     objects::check(device, places, findings);
     pdo::check(device, places, findings);
+    standard::check(device, places, findings);
 }
 
 /// Where things stand in the file.
@@ -178,7 +180,7 @@ mod tests {
 
     #[test]
     fn every_mutation_is_found_with_its_rule() {
-        let cases: [(&str, &str, Rule); 47] = [
+        let cases: [(&str, &str, Rule); 49] = [
             ("[FileInfo]", "[FileInfos]", Rule::MissingSection),
             ("EDSVersion=4.0", "EDSVersion=four", Rule::FileInfo),
             ("FileVersion=1\n", "", Rule::FileInfo),
@@ -219,6 +221,12 @@ mod tests {
             ("DefaultValue=0x191", "DefaultValue=0x191\nDefaultValue=0x192", Rule::DuplicateKey),
             ("[1000]", "[2000]", Rule::DuplicateSection),
             ("HighLimit=10", "HighLimit=10\nObjFlags=0x10", Rule::ObjFlags),
+            (
+                "DataType=0x0007\nAccessType=ro\nDefaultValue=0x191",
+                "DataType=0x0006\nAccessType=ro\nDefaultValue=0x191",
+                Rule::Standard,
+            ),
+            ("$NODEID+0x200", "$NODEID+0x580", Rule::Standard),
             ("0x20000010", "0x20000020", Rule::PdoMapping),
             ("0x20000010", "0x20010010", Rule::PdoMapping),
             ("0x20000010", "0x10000020", Rule::PdoMapping),
