@@ -1,7 +1,7 @@
 //! Sections of objects to [`Object`]s (CiA 306-1, 6.6.3).
 
 use alloc::borrow::ToOwned;
-use alloc::collections::BTreeMap;
+use alloc::collections::{BTreeMap, BTreeSet};
 use alloc::format;
 use alloc::string::String;
 use alloc::vec::Vec;
@@ -17,6 +17,9 @@ use crate::data_type::DataType;
 
 /// Bytes that the sub-objects of compact storage take in one file, at most: every one has the object's own text.
 const COMPACT_ROOM: usize = 64 << 20;
+
+/// Highest sub-index of a list: FFh describes the structure (CiA 301, 7.4.4).
+const LAST: u8 = 0xFE;
 
 /// Collects the sections of objects, which come in any order.
 #[derive(Default)]
@@ -80,7 +83,13 @@ impl<'a> Builder<'a> {
                 continue;
             }
             room -= needed;
-            for subindex in 0..=count {
+            if count > LAST {
+                let line = self.declared.get(&object.index).map_or(0, |declared| declared.section.line);
+                let message =
+                    format!("CompactSubObj={count}, {LAST} at most: FFh is no sub-object of a list");
+                findings.add(line, Rule::Compact, message);
+            }
+            for subindex in 0..=count.min(LAST) {
                 if object.subs.binary_search_by_key(&subindex, |entry| entry.subindex).is_err() {
                     object.insert(object.compact_entry(subindex));
                 }
@@ -165,6 +174,7 @@ impl<'a> Builder<'a> {
         }
         let mut declared = None;
         let mut count = 0;
+        let mut seen = BTreeSet::new();
         for (line, key, value) in section.entries() {
             if key.eq_ignore_ascii_case("NrOfEntries") {
                 declared = Some((line, Number::parse(value)));
@@ -183,6 +193,9 @@ impl<'a> Builder<'a> {
                 rest.set(key, value);
                 continue;
             };
+            if !seen.insert(entry.subindex) {
+                duplicate(line, key, findings);
+            }
             match part {
                 Part::Names => value.clone_into(&mut entry.name),
                 Part::Values => entry.value = Some(value.to_owned()),

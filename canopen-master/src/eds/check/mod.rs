@@ -261,6 +261,32 @@ mod tests {
         assert!(found[0].contains("entry 3 of [MandatoryObjects] stands where 2 should"), "{found:?}");
     }
 
+    /// Of two values of one sub-object the last one counted without a word, and FFh was one.
+    #[test]
+    fn compact_storage_with_doubtful_entries() {
+        let compact = |count: u8, values: &str| {
+            let sub_number = "[1018]\nParameterName=Identity\nObjectType=0x9\nSubNumber=2\n";
+            let list = alloc::format!(
+                "{sub_number}[2001]\nParameterName=L\nObjectType=0x8\nDataType=0x5\nAccessType=rw\nPDOMapping=0\n\
+                 CompactSubObj={count}\n[2001Value]\n{values}"
+            );
+            let text = GOOD.replacen(sub_number, &list, 1).replacen(
+                "SupportedObjects=1\n1=0x2000",
+                "SupportedObjects=2\n1=0x2000\n2=0x2001",
+                1,
+            );
+            let reading = read(text.as_bytes()).unwrap();
+            (findings(&text), reading.device.object(0x2001).unwrap().subs.len())
+        };
+        assert_eq!(compact(254, "NrOfEntries=1\n1=5\n"), (Vec::new(), 255));
+        let (found, subs) = compact(255, "NrOfEntries=1\n1=5\n");
+        assert_eq!((found.len(), subs), (1, 255), "{found:?}");
+        assert!(found[0].contains("CompactSubObj=255, 254 at most"), "{found:?}");
+        let (found, _) = compact(3, "NrOfEntries=2\n1=5\n1=6\n");
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert!(found[0].contains("1 is there already"), "{found:?}");
+    }
+
     /// What the sections of one object say together is not missing in each.
     #[test]
     fn sections_that_are_joined_need_each_key_once() {
