@@ -97,8 +97,15 @@ fn everything<D: Behaviour>(node: &Node<D>) -> Objects {
     }
     for index in [0x1400, 0x1600, 0x1800, 0x1A00].into_iter().flat_map(|base| base..base + PDOS as u16) {
         for sub in 0..=MAPPED as u8 {
-            let Ok(value) = node.pdos().parameter(Address::new(index, sub)) else { continue };
+            let at = Address::new(index, sub);
+            let Ok(value) = node.pdos().parameter(at) else { continue };
             let count = sub == 0 && index & 0x200 == 0;
+            if node.device().describes_pdos() {
+                if let Some(entry) = all.entry_mut(at).filter(|_| !count) {
+                    entry.value = value.as_slice().to_vec();
+                }
+                continue;
+            }
             let data_type = match value.as_slice().len() {
                 1 => DataType::UNSIGNED8,
                 2 => DataType::UNSIGNED16,

@@ -22,7 +22,7 @@ impl<D: Device> Dictionary<D> {
         Self { device, objects, download: Vec::new() }
     }
 
-    fn writable(&self, at: Address) -> Result<&Entry, AbortCode> {
+    pub(super) fn writable(&self, at: Address) -> Result<&Entry, AbortCode> {
         let entry = self.objects.found(at)?;
         if entry.rights.can_write() { Ok(entry) } else { Err(AbortCode::READ_ONLY) }
     }

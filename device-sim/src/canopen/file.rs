@@ -47,14 +47,12 @@ impl FileNode {
             serial: number(4).filter(|serial| *serial != 0).unwrap_or(serial),
         };
         let mut objects = objects(0, device.product_name(), identity);
+        // Of what every node has, an object of the file has only its own entries.
+        objects.retain(|at| device.object(at.index).is_none_or(|object| object.entry(at.sub).is_some()));
         let id = node.map(NodeId::raw);
         for object in &device.objects {
-            if object.is_composed() {
-                for entry in object.entries() {
-                    add(&mut objects, object.index, entry.subindex, &device, entry, id);
-                }
-            } else {
-                add(&mut objects, object.index, 0, &device, &object.own, id);
+            for entry in object.entries() {
+                add(&mut objects, &device, object, entry, id);
             }
         }
         let rpdos = core::array::from_fn(|number| slot(&device, 0x1400, number as u16, id));
@@ -98,43 +96,53 @@ fn slot(device: &eds::Device, index: u16, number: u16, node: Option<u8>) -> Slot
 
 fn add(
     objects: &mut Objects,
-    index: u16,
-    sub: u8,
     device: &eds::Device,
+    object: &eds::Object,
     entry: &eds::Entry,
     node: Option<u8>,
 ) {
-    // The engine's own, and what the node itself lives by: identity, the store.
-    let engine = matches!(index, 0x1001 | 0x1003 | 0x1400..0x1C00);
-    let own = matches!(index, 0x1010 | 0x1011 | 0x1018 | 0x2000);
-    if engine || (own && objects.entry(Address::new(index, sub)).is_some()) {
+    let at = Address::new(object.index, entry.subindex);
+    // The engine's own.
+    if matches!(at.index, 0x1001 | 0x1003) {
         return;
     }
     let data_type = entry.data_type.map_or(DataType::DOMAIN, |own| DataType(device.base_type(own).0));
-    let value = value(entry, node);
     let rights = entry.access.map_or(Rights::Ro, Access::rights);
     let mut new = match data_type.size() {
         Some(_) => Entry::number(data_type, rights, 0),
         None => Entry { data_type, rights, ..Entry::domain(LONGEST) },
     };
-    if let Some(value) =
-        value.filter(|value| data_type.size().is_none_or(|size| value.len() == usize::from(size)))
-    {
-        new.value = value;
-    }
     new.mappable = entry.is_mappable();
-    // Beyond 64 bits with sign only the limits of a type are.
+    // Beyond 64 bits with sign only the limits of a type are; what is written to 1010h and 1011h is none
+    // of their values.
     if let (Some(low), Some(high)) = entry.limits(node)
         && let (Ok(low), Ok(high)) = (i64::try_from(low), i64::try_from(high))
         && low <= high
+        && !matches!(at.index, 0x1010 | 0x1011)
     {
         new.limits = Some(Limits { low, high });
     }
-    objects.insert(index, sub, new);
+    let fits = |value: &Vec<u8>| data_type.size().is_none_or(|size| value.len() == usize::from(size));
+    let given = value(entry, node).filter(fits);
+    let own = objects.entry(at).filter(|own| own.data_type == data_type).map(|own| own.value.clone());
+    // LSS has the identity, too.
+    let of_lss = at.index == 0x1018 && at.sub > 0;
+    if let Some(value) = if of_lss { own.or(given) } else { given.or(own) } {
+        new.value = value;
+    } else if at.sub == 0 && object.is_composed() {
+        new.set(object.entries().last().map_or(0, |last| last.subindex.into()));
+    } else if let Some(Limits { low, high }) = new.limits {
+        new.set(0.clamp(low, high).into());
+    }
+    objects.insert(at.index, at.sub, new);
 }
 
 impl Device for FileNode {
     fn written(&mut self, _context: &mut Context<'_>, _at: Address) {}
 
     fn update(&mut self, _context: &mut Context<'_>) {}
+
+    fn describes_pdos(&self) -> bool {
+        true
+    }
 }

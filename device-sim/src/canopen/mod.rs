@@ -2,7 +2,8 @@
 //! [`Device`] is what it does. There are a servo drive ([`Ld2000`]), an I/O node
 //! ([`RemoteIo`]) and a node with the objects of any EDS ([`FileNode`]).
 //!
-//! Every node has stores for tests at 2000h:01 (64 KiB) and :02 (1 MiB), and a text longer than four bytes at 100Ah.
+//! Every node has stores for tests at 2000h:01 (64 KiB) and :02 (1 MiB), and a text longer than four bytes at
+//! 100Ah, unless its device file has objects of its own there.
 
 mod common;
 mod description;
@@ -12,6 +13,7 @@ mod file;
 mod io;
 mod node;
 mod objects;
+mod served;
 
 use core::time::Duration;
 
@@ -59,6 +61,12 @@ pub trait Device {
 
     /// Whether a change does not yet cause the event-driven TPDO with this number (from 0).
     fn holds_back(&mut self, _context: &mut Context<'_>, _tpdo: usize) -> bool {
+        false
+    }
+
+    /// Whether the PDO parameters that there are, and who may write them, are those among the node's objects
+    /// (1400h to 1BFFh). Otherwise it has all that the engine has.
+    fn describes_pdos(&self) -> bool {
         false
     }
 

@@ -8,9 +8,10 @@ use canopen_master::slave::{Config, Event, Slave};
 use canopen_master::{guarding, heartbeat, od};
 use pdo::{Address, CobId, Communication, DefaultPdo, Frame, NodeId, Payload, Service, Transmission};
 
-use super::common::{MAPPED, PDOS, Slot};
+use super::common::{PDOS, Slot};
 use super::dictionary::Dictionary;
 use super::objects::Objects;
+use super::served::Served;
 use super::{Context, Device, Error, Pdos};
 use crate::can;
 
@@ -40,7 +41,7 @@ struct Image {
 /// too, gives all its objects the values after power-up or those stored with 1010h.
 #[derive(Debug)]
 pub struct Node<D> {
-    slave: Slave<od::Objects<Dictionary<D>, PDOS, PDOS, MAPPED>>,
+    slave: Slave<Served<D>>,
     /// Values after power-up.
     factory: Image,
     /// Values stored with 1010h.
@@ -62,7 +63,7 @@ impl<D: Device> Node<D> {
             factory.leave(node);
         }
         let dictionary = Dictionary::new(device, objects);
-        let slave = Slave::new(&config, od::Objects { dictionary, pdos });
+        let slave = Slave::new(&config, Served(od::Objects { dictionary, pdos }));
         Self { slave, factory, stored: None, started: false, sent: [None; PDOS] }
     }
 
@@ -78,23 +79,23 @@ impl<D: Device> Node<D> {
         self.slave.state()
     }
 
-    /// Its objects but for the error register, the error history and the parameters of its
+    /// Its objects but for the error register, the error history and the values of its
     /// [`pdos`](Self::pdos).
     #[must_use]
     pub const fn objects(&self) -> &Objects {
-        &self.slave.objects().dictionary.objects
+        &self.slave.objects().0.dictionary.objects
     }
 
     /// Its PDOs.
     #[must_use]
     pub const fn pdos(&self) -> &Pdos {
-        &self.slave.objects().pdos
+        &self.slave.objects().0.pdos
     }
 
     /// What it does.
     #[must_use]
     pub const fn device(&self) -> &D {
-        &self.slave.objects().dictionary.device
+        &self.slave.objects().0.dictionary.device
     }
 
     /// Lets something happen to the device, such as a fault; what comes of it is sent.
@@ -107,7 +108,8 @@ impl<D: Device> Node<D> {
     fn with<T>(&mut self, now: Duration, work: impl FnOnce(&mut D, &mut Context<'_>) -> T) -> T {
         let mut errors = Vec::new();
         let state = self.slave.state();
-        let od::Objects { dictionary: Dictionary { device, objects, .. }, pdos } = self.slave.objects_mut();
+        let od::Objects { dictionary: Dictionary { device, objects, .. }, pdos } =
+            &mut self.slave.objects_mut().0;
         let done = work(device, &mut Context { now, objects, pdos, state, errors: &mut errors });
         for error in errors {
             // A full queue drops the message, not the history.
@@ -134,7 +136,7 @@ impl<D: Device> Node<D> {
             return;
         }
         for number in 0..PDOS {
-            let od::Objects { dictionary, pdos } = self.slave.objects();
+            let od::Objects { dictionary, pdos } = &self.slave.objects().0;
             let slot = pdos.tpdo_slots().get(number);
             let watched = slot.is_some_and(|slot| match slot.communication.transmission {
                 Transmission::SyncAcyclic => acyclic,
@@ -143,7 +145,7 @@ impl<D: Device> Node<D> {
             let Some(data) = pdos.data(number, dictionary).filter(|_| watched) else { continue };
             let changed = self.sent.get(number) != Some(&Some(data));
             if changed && !self.with(now, |device, context| device.holds_back(context, number)) {
-                self.slave.objects_mut().pdos.trigger(number);
+                self.slave.objects_mut().0.pdos.trigger(number);
             }
         }
     }
@@ -153,12 +155,12 @@ impl<D: Device> Node<D> {
         if let Some(sent) = self.sent.get_mut(number) {
             *sent = None;
         }
-        self.slave.objects_mut().pdos.withdraw(number);
+        self.slave.objects_mut().0.pdos.withdraw(number);
     }
 
     /// Remembers what a TPDO carries.
     fn sends(&mut self, frame: &Frame) {
-        let slots = self.slave.objects().pdos.tpdo_slots();
+        let slots = self.slave.objects().0.pdos.tpdo_slots();
         for (slot, sent) in slots.iter().zip(&mut self.sent) {
             if frame.standard_id() == slot.communication.cob_id.standard_id() {
                 *sent = Some(Payload::from_slice(frame.data()));
@@ -179,7 +181,7 @@ impl<D: Device> Node<D> {
         if let Some(node) = self.slave.next_node() {
             image.follow(node);
         }
-        let own = self.slave.objects_mut();
+        let own = &mut self.slave.objects_mut().0;
         (own.dictionary.objects, own.pdos) = (image.objects, image.pdos);
         if self.slave.boot(now) {
             for state in [State::BootUp, State::PreOperational] {
@@ -218,7 +220,7 @@ impl<D: Device> Node<D> {
     fn written(&mut self, now: Duration, at: Address) {
         match at.index {
             0x1010 => {
-                let od::Objects { dictionary, pdos } = self.slave.objects();
+                let od::Objects { dictionary, pdos } = &self.slave.objects().0;
                 let mut image = Image { objects: dictionary.objects.clone(), pdos: pdos.clone() };
                 if let Some(node) = self.node() {
                     image.leave(node);

@@ -136,6 +136,11 @@ impl Objects {
         self.insert(index, 0, Entry::number(DataType::UNSIGNED8, Rights::Ro, i128::from(count)));
     }
 
+    /// Takes those away that are not to be kept.
+    pub(super) fn retain(&mut self, mut keep: impl FnMut(Address) -> bool) {
+        self.0.retain(|at, _| keep(*at));
+    }
+
     /// An object.
     #[must_use]
     pub fn entry(&self, at: Address) -> Option<&Entry> {

@@ -165,6 +165,76 @@ PDOMapping=0
     assert_eq!(bench.get(0x2000, 1), [1; 100]);
 }
 
+/// Of 1010h, 1018h, 2000h and the PDOs it had what the engine has, whatever the file said.
+#[test]
+fn a_node_from_a_device_file_has_the_entries_of_the_file() {
+    let var = |index: &str, data_type: u8, access: &str, more: &str| {
+        format!(
+            "[{index}]\nParameterName=x\nObjectType=7\nDataType={data_type}\nAccessType={access}\n{more}\n"
+        )
+    };
+    let record = |index: &str, count: u8| {
+        let number = var(&format!("{index}sub0"), 5, "ro", &format!("DefaultValue={count}"));
+        format!("[{index}]\nParameterName=x\nObjectType=9\nSubNumber={count}\n{number}")
+    };
+    let file = [
+        DEVICE_INFO.to_owned(),
+        "[MandatoryObjects]\nSupportedObjects=1\n1=0x1018\n".into(),
+        "[OptionalObjects]\nSupportedObjects=3\n1=0x1010\n2=0x1400\n3=0x1404\n".into(),
+        "[ManufacturerObjects]\nSupportedObjects=2\n1=0x2000\n2=0x2001\n".into(),
+        record("1018", 3),
+        ["1", "2", "3"].map(|sub| var(&format!("1018sub{sub}"), 7, "ro", "")).concat(),
+        record("1010", 3),
+        ["1", "3"].map(|sub| var(&format!("1010sub{sub}"), 7, "rw", "")).concat(),
+        record("1400", 4),
+        var("1400sub1", 7, "const", "DefaultValue=$NODEID+0x200"),
+        var("1400sub2", 5, "rw", "DefaultValue=255"),
+        var("1400sub4", 5, "rw", "DefaultValue=7"),
+        record("1404", 2),
+        var("1404sub1", 7, "rw", "DefaultValue=0x80000000"),
+        var("2000", 6, "rw", "DefaultValue=9"),
+        var("2001", 2, "rw", "LowLimit=3\nHighLimit=20"),
+    ]
+    .concat();
+    let mut bench = Bench::new(FileNode::node(file.as_bytes(), id(42), 5).unwrap(), Faults::NONE);
+    for (index, value) in [(0x1018, 3), (0x1010, 3), (0x1400, 4), (0x1404, 2), (0x2001, 3)] {
+        assert_eq!(bench.get(index, 0), [value], "{index:04X}h");
+    }
+    assert_eq!(bench.get(0x1400, 1), 0x22A_u32.to_le_bytes());
+    assert_eq!(bench.get(0x1400, 4), [7]);
+    let mut refused = |index, sub, value: Option<&[u8]>, code| {
+        let options = Options::default();
+        let outcome = match value {
+            Some(value) => bench.write(index, sub, value, &options),
+            None => bench.read(index, sub, &options).map(drop),
+        };
+        assert_eq!(outcome, Err(Outcome::Aborted(code)), "{index:04X}h:{sub:02X}");
+    };
+    for (index, sub) in [(0x1018, 4), (0x1010, 2), (0x1400, 3), (0x1400, 5), (0x1404, 2), (0x2000, 1)] {
+        refused(index, sub, None, AbortCode::NO_SUB_INDEX);
+    }
+    refused(0x1600, 0, None, AbortCode::NO_OBJECT);
+    refused(0x1800, 0, None, AbortCode::NO_OBJECT);
+    refused(0x1400, 0, Some(&[4]), AbortCode::READ_ONLY);
+    refused(0x1400, 1, Some(&0x8000_022A_u32.to_le_bytes()), AbortCode::READ_ONLY);
+    refused(0x1400, 2, Some(&[241]), AbortCode::INVALID_VALUE);
+    bench.put(0x1400, 2, &[1]);
+    assert_eq!(bench.get(0x1400, 2), [1]);
+    bench.put(0x1404, 1, &0x8000_0123_u32.to_le_bytes());
+    assert_eq!(bench.get(0x1404, 1), 0x8000_0123_u32.to_le_bytes());
+    bench.put(0x2000, 0, &[1, 2]);
+    bench.put(0x1010, 3, b"save");
+    bench.send(Frame::standard(0x000, [0x81, 42]));
+    assert_eq!(bench.get(0x2000, 0), [1, 2]);
+    assert_eq!(bench.get(0x1404, 1), 0x8000_0123_u32.to_le_bytes());
+    // Its own file has no more than that.
+    let own = device_file(&FileNode::node(file.as_bytes(), id(42), 5).unwrap(), "own");
+    let subs =
+        |index| own.object(index).map(|object| object.entries().iter().map(|entry| entry.subindex).collect());
+    assert_eq!(subs(0x1400), Some(vec![0, 1, 2, 4]));
+    assert_eq!(subs(0x1800), None);
+}
+
 /// Single frames lost, doubled, delayed, destroyed: every transfer ends right or with a named error, and
 /// afterwards the node answers as before.
 #[test]
