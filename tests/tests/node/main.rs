@@ -91,6 +91,53 @@ fn a_node_of_a_device_file_passes() {
     assert_passes(&test(&mut bench, &config(&device, true), |_| {}).unwrap());
 }
 
+/// A text of one segment was taken for one of two; the PDOs, the identity and the stores of a node made of
+/// a file were not those of the file.
+#[test]
+fn a_node_of_a_device_file_with_less_than_the_engine_has_passes() {
+    let mut device = device_file(&RemoteIo::node(None, 1, false), "Copy");
+    for (index, count) in [(0x1018, 3), (0x1400, 2), (0x1401, 2), (0x1800, 3)] {
+        let object = device.object_mut(index).unwrap();
+        object.subs.retain(|entry| entry.subindex <= count);
+        object.entry_mut(0).unwrap().default = Some(count.to_string());
+    }
+    for index in [0x1008, 0x1009, 0x100A] {
+        device.object_mut(index).unwrap().own.default = Some("Short".into());
+    }
+    let text = eds::write_eds(&device);
+    let device = eds::read(text.as_bytes()).unwrap().device;
+    let node = FileNode::node(text.as_bytes(), Some(id()), 1).unwrap();
+    let mut bench = Bench::new(node, honest);
+    let cases = test(&mut bench, &config(&device, true), |_| {}).unwrap();
+    assert_passes(&cases);
+    let of_two = cases.iter().find(|case| case.id == "block.retransmission").unwrap();
+    assert_eq!(of_two.outcome.reason(), Some("1008h:00 has 5 bytes: one segment, two needed"));
+}
+
+#[test]
+fn nodes_of_recorded_device_files_pass() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/recorded/eds");
+    if !folder.exists() {
+        println!("ignored: needs ../shared/recorded");
+        return;
+    }
+    for (name, faults) in [
+        ("KITmedical__kacanopen__epos2_347717.eds", &[][..]),
+        ("dianhuaeven__Eyou_Canopen_master__YiyouServo_V1.4.eds", &[]),
+        ("CANopenNode__CANopenDemo__demoDevice.eds", &[]),
+        ("greggg-rgb__odrive-cia402-profile__odrive-canopen-cia402.xdd", &[]),
+        // Its PDOs map objects that it does not have.
+        ("canopen-python__canopen__sample.eds", &["pdo.mapping"]),
+    ] {
+        let bytes = std::fs::read(folder.join(name)).unwrap();
+        let device = eds::read(&bytes).unwrap().device;
+        let mut bench = Bench::new(FileNode::node(&bytes, Some(id()), 1).unwrap(), honest);
+        let cases = test(&mut bench, &config(&device, true), |_| {}).unwrap();
+        let found: Vec<_> = failed(&cases).into_iter().map(|(id, _)| id).collect();
+        assert_eq!(found, faults, "{name}: {:#?}", failed(&cases));
+    }
+}
+
 #[test]
 fn a_silent_node_and_one_at_work_are_left_alone() {
     let node = RemoteIo::node(Some(id()), 1, false);
