@@ -278,7 +278,8 @@ fn special(at: Address, data: &[u8]) -> Option<String> {
             let object = Mapped::from_entry(u32()?);
             let name = eds::standard_object(object.index).map_or("", |known| known.words);
             let space = if name.is_empty() { "" } else { " " };
-            format!("{:04X}h:{:02X}{space}{name}, {} bits", object.index, object.sub, object.bits)
+            let bits = counted(object.bits.into(), "bit", "bits");
+            format!("{:04X}h:{:02X}{space}{name}, {bits}", object.index, object.sub)
         }
         _ => return None,
     })

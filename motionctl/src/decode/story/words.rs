@@ -69,7 +69,8 @@ pub(super) fn date(nanos: i64) -> String {
 /// The last line.
 pub(in super::super) fn summary(totals: &Totals, out: &mut impl Write) -> io::Result<()> {
     let kinds: Vec<String> = named(&totals.by_kind).map(|(name, count)| format!("{count} {name}")).collect();
-    write!(out, "\n{} frames", totals.frames - totals.copies)?;
+    let frames = usize::try_from(totals.frames - totals.copies).unwrap_or(usize::MAX);
+    write!(out, "\n{}", counted(frames, "frame", "frames"))?;
     if !kinds.is_empty() {
         write!(out, ": {}", kinds.join(", "))?;
     }
