@@ -89,7 +89,7 @@ impl<'a> Builder<'a> {
                     format!("CompactSubObj={count}, {LAST} at most: FFh is no sub-object of a list");
                 findings.add(line, Rule::Compact, message);
             }
-            for subindex in 0..=count.min(LAST) {
+            for subindex in 0..=count {
                 if object.subs.binary_search_by_key(&subindex, |entry| entry.subindex).is_err() {
                     object.insert(object.compact_entry(subindex));
                 }

@@ -261,7 +261,7 @@ mod tests {
         assert!(found[0].contains("entry 3 of [MandatoryObjects] stands where 2 should"), "{found:?}");
     }
 
-    /// Of two values of one sub-object the last one counted without a word, and FFh was one.
+    /// Of two values of one sub-object the last one counts, and FFh is none; files are as they are all the same.
     #[test]
     fn compact_storage_with_doubtful_entries() {
         let compact = |count: u8, values: &str| {
@@ -280,7 +280,7 @@ mod tests {
         };
         assert_eq!(compact(254, "NrOfEntries=1\n1=5\n"), (Vec::new(), 255));
         let (found, subs) = compact(255, "NrOfEntries=1\n1=5\n");
-        assert_eq!((found.len(), subs), (1, 255), "{found:?}");
+        assert_eq!((found.len(), subs), (1, 256), "{found:?}");
         assert!(found[0].contains("CompactSubObj=255, 254 at most"), "{found:?}");
         let (found, _) = compact(3, "NrOfEntries=2\n1=5\n1=6\n");
         assert_eq!(found.len(), 1, "{found:?}");
