@@ -13,7 +13,8 @@ pub(super) struct Line {
     /// Bytes of data.
     len: usize,
     seconds: u64,
-    kind: Kind,
+    /// What it is, where what follows the data depends on nothing else.
+    kind: Option<Kind>,
     text: [u8; 256],
     text_len: usize,
     decimals_at: usize,
@@ -25,11 +26,11 @@ pub(super) struct Line {
 
 impl Line {
     /// The line of a frame from its text, and where in it the digits of the data stand; `None` of one
-    /// that is too long.
+    /// that is too long. `kind`: where it alone says what follows the data.
     pub(super) fn new(
         bus: u16,
         frame: &Frame,
-        kind: &Kind,
+        kind: Option<Kind>,
         moment: Moment,
         text: &[u8],
         data_at: usize,
@@ -40,7 +41,7 @@ impl Line {
             bus,
             len,
             seconds: moment.seconds,
-            kind: *kind,
+            kind,
             text: [0; 256],
             text_len: text.len(),
             decimals_at: 1 + text.iter().position(|&byte| byte == b'.')?,
@@ -61,7 +62,7 @@ impl Line {
     /// Whether what follows the data is the same, and stands at the same place.
     #[inline]
     pub(super) fn ends_like(&self, frame: &Frame, kind: &Kind) -> bool {
-        self.len == frame.len() && self.kind == *kind
+        self.len == frame.len() && self.kind.as_ref() == Some(kind)
     }
 
     /// Writes what stands before the data.

@@ -116,12 +116,12 @@ impl Teller for Json<'_> {
         }
         let data_at = self.out.len() - from;
         self.put_rest(record, kind, tracer);
-        // Of the others the next one mostly differs, and only its head is taken.
+        // Of the others the next one mostly differs behind its data, and only its head is taken.
         let stays = matches!(kind, Kind::Pdo { .. } | Kind::Heartbeat { .. } | Kind::Unknown);
-        if (!known || stays)
+        if (!known || stays && constant)
             && let (Some(place), Some(text)) = (self.lines.get_mut(frame.id as usize), self.out.get(from..))
         {
-            *place = Line::new(number, frame, kind, moment, text, data_at);
+            *place = Line::new(number, frame, constant.then_some(*kind), moment, text, data_at);
         }
     }
 
@@ -299,7 +299,7 @@ mod tests {
             // A mapping is read, other requests, counting bytes.
             let data: [u8; 8] = match below(4) {
                 0 => [0x40, 0, 0x1A, below(3) as u8, 0, 0, 0, 0],
-                1 => [0x4F, 0, 0x1A, 0, 1, 0, 0, 0],
+                1 => [0x4F, 0, 0x1A, 0, below(2) as u8, 0, 0, 0],
                 2 => [0x43, 0, 0x1A, 1, 16, 0, 0x41, 0x60],
                 _ => (below(1 << 31) << 32 | below(1 << 31)).to_le_bytes(),
             };
