@@ -4,12 +4,11 @@
 use super::log_line::LogLines;
 use super::reader::{INNER_CR, Parsed, has_inner_cr};
 use super::record::{Buses, Direction, FrameKind, MAX_DATA, Record, Time};
-use super::scan::{date_time, decimal, fixed, hex, hex_byte, hex_run, nibble, word};
+use super::scan::{SECONDS, date_time, decimal, fixed, hex, hex_byte, hex_run, nibble, word};
 
 /// Flag of SocketCAN in an identifier of 8 digits: an error report.
 const ERROR_FLAG: u32 = 0x2000_0000;
 const TOO_MUCH: &str = "up to 8 bytes in hex expected after #";
-const SECONDS: i64 = 1_000_000_000;
 
 /// Reads candump lines of either form, line by line.
 #[derive(Debug, Default)]

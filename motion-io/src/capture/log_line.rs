@@ -2,9 +2,7 @@
 //! `(1436509052.249713) can0 581#4B41600018028FAF`.
 
 use super::record::{Bus, FrameKind, Record, Time};
-use super::scan::{decimal, decimal_of_8, hex_of_16, nibble};
-
-const SECONDS: i64 = 1_000_000_000;
+use super::scan::{SECONDS, decimal, decimal_of_8, hex_of_16, nibble};
 
 /// What such a line mostly has in common with the one before.
 #[derive(Debug)]

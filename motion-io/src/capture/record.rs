@@ -23,6 +23,9 @@ pub enum Times {
 }
 
 impl Time {
+    /// A time from here on is one since 1970: no recording lasts three years.
+    pub const EPOCH: Self = Self(100_000_000 * 1_000_000_000);
+
     /// The time for engines, which know no time before zero.
     #[must_use]
     pub fn since_zero(self) -> core::time::Duration {

@@ -1,5 +1,8 @@
 //! Taking bytes of text apart: numbers, hex, blanks.
 
+/// Nanoseconds: the scale of [`fixed`] for seconds.
+pub(super) const SECONDS: i64 = 1_000_000_000;
+
 /// Value of a hex digit; `FF` for other bytes.
 const HEX: [u8; 256] = {
     let mut table = [0xFF; 256];

@@ -109,8 +109,6 @@ pub(super) fn recognise(start: &[u8]) -> Result<Format, CaptureError> {
 /// several buses that were not read in order.
 pub(super) fn has_deltas(start: &[u8]) -> bool {
     const OFTEN: usize = 8;
-    // No two frames are three years apart: that is a time since 1970.
-    const LONG: Time = Time(100_000_000 * 1_000_000_000);
     let Some(mut parser) = TextParser::new(Format::Candump) else { return false };
     let (mut record, mut buses) = (Record::EMPTY, Buses::default());
     let (mut last, mut times, mut back) = (Time(i64::MIN), 0, 0);
@@ -119,7 +117,7 @@ pub(super) fn has_deltas(start: &[u8]) -> bool {
             continue;
         }
         let Some(time) = record.time else { continue };
-        if time >= LONG {
+        if time >= Time::EPOCH {
             return false;
         }
         back += usize::from(time < last);

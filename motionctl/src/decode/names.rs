@@ -172,8 +172,13 @@ impl Names {
     /// A value in words.
     pub(crate) fn words(&self, node: NodeId, at: Address, data: &[u8]) -> String {
         if let Some(words) = special(at, data) {
-            return match special_len(at.index) {
-                Some(len) if len != data.len() => {
+            let is_state = matches!(
+                at.index,
+                ds402::CONTROL_WORD | ds402::STATUS_WORD | ds402::MODE | ds402::MODE_DISPLAY
+            );
+            let len = self.data_type(node, at).filter(|_| is_state).and_then(DataType::size);
+            return match len {
+                Some(len) if usize::from(len) != data.len() => {
                     format!("{words}, in {}", counted(data.len(), "byte", "bytes"))
                 }
                 _ => words,
@@ -218,15 +223,6 @@ pub(crate) fn bytes(data: &[u8]) -> String {
         0 => "nothing".into(),
         len if len > MOST => format!("{} … ({len} bytes)", shown.join(" ")),
         _ => shown.join(" "),
-    }
-}
-
-/// Bytes of the objects among those whose bits have a meaning that every device has in this length.
-const fn special_len(index: u16) -> Option<usize> {
-    match index {
-        ds402::CONTROL_WORD | ds402::STATUS_WORD => Some(2),
-        ds402::MODE | ds402::MODE_DISPLAY => Some(1),
-        _ => None,
     }
 }
 

@@ -7,7 +7,7 @@ use canopen_master::{NodeId, ds402};
 use serde_json::{Value, json};
 
 use super::sheet::Tone;
-use super::time::{age, in_ms, is_silent, seconds, since};
+use super::time::{age, in_ms, seconds, since};
 use crate::can::value::hex;
 use crate::decode::names::text;
 use crate::decode::story::{Cycle, Rhythm, Story};
@@ -151,7 +151,7 @@ impl<'a> View<'a> {
                 period: rhythm.period,
                 last: rhythm.last,
                 missed: rhythm.missed_by(now),
-                silent: is_silent(rhythm.last, rhythm.period, now),
+                silent: rhythm.silence(now).is_some(),
             }),
             (_, Some(rhythm)) => Some(Control {
                 name: "guarding",

@@ -2,9 +2,6 @@
 
 use serde_json::{Value, json};
 
-/// A node that has not been heard for so many tenths of its period is silent.
-const SILENT: i64 = 25;
-
 /// Seconds for JSON, to the microsecond.
 pub(super) fn seconds(nanos: Option<i64>) -> Value {
     nanos.map_or(Value::Null, |nanos| json!((nanos / 1000) as f64 / 1e6))
@@ -27,11 +24,4 @@ pub(super) fn age(now: Option<i64>, then: Option<i64>) -> String {
         age if age < 6000.0 => format!("{:.0} min", age / 60.0),
         age => format!("{:.0} h", age / 3600.0),
     }
-}
-
-/// Whether something that came at a period has not come for more than twice of it.
-pub(super) fn is_silent(last: Option<i64>, period: Option<i64>, now: Option<i64>) -> bool {
-    since(now, last)
-        .zip(period)
-        .is_some_and(|(age, period)| period > 0 && age.saturating_mul(10) > period.saturating_mul(SILENT))
 }

@@ -30,7 +30,7 @@ const CONTROLLERS: [&str; 7] = [
     "transmit error passive",
     "error active again",
 ];
-/// Bits of `data[2]`; PEAK numbers its types like the first ones, the SJA1000 like the first four.
+/// Bits of `data[2]`. The first three are types of PEAK, as bits, and of the SJA1000, as numbers, too.
 const PROTOCOLS: [&str; 7] = [
     "bit error",
     "form error",

@@ -11,12 +11,12 @@ mod sdo;
 mod words;
 
 use core::fmt::Write as _;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::io::Write;
 
 use canopen_master::ds402::StatusWord;
 use canopen_master::nmt::State;
-use canopen_master::trace::{Kind, Mapped, Outcome, PdoDirection, Tracer, Transfer};
+use canopen_master::trace::{Kind, Outcome, PdoDirection, Tracer, Transfer};
 use canopen_master::{Address, NodeId, ds402};
 use motion_io::capture::{Frame, FrameKind, Record, Time};
 
@@ -31,8 +31,6 @@ use words::{date, lss_words};
 
 /// How many values of one object are told, unless its values are states.
 const VALUES: u32 = 4;
-/// Times from here on are times of day: the story begins at 0.
-const EPOCH: i64 = 100_000_000 * 1_000_000_000;
 
 pub(crate) struct Story<'a> {
     names: &'a Names,
@@ -51,10 +49,6 @@ pub(crate) struct Story<'a> {
     objects: BTreeMap<(u16, NodeId, Address, bool), Told>,
     /// `None`: a status word that shows no state.
     drives: BTreeMap<(u16, NodeId), Option<ds402::State>>,
-    /// Of PDOs.
-    mappings: BTreeMap<Cycle, Vec<Mapped>>,
-    /// PDOs with fewer bytes than their mapping has.
-    short: BTreeSet<Cycle>,
     silent: BTreeMap<(u16, NodeId), u32>,
     last: Last,
 }
@@ -92,8 +86,6 @@ impl<'a> Story<'a> {
             given_up: BTreeMap::new(),
             objects: BTreeMap::new(),
             drives: BTreeMap::new(),
-            mappings: BTreeMap::new(),
-            short: BTreeSet::new(),
             silent: BTreeMap::new(),
             last: Last::default(),
         }
@@ -172,15 +164,14 @@ impl<'a> Story<'a> {
         let objects = tracer.mapped(number, kind, frame.data()).objects();
         let bits: usize = objects.iter().map(|object| usize::from(object.bits)).sum();
         let (expected, len) = (bits.div_ceil(8), frame.len());
-        if len >= expected {
-            self.short.remove(&cycle);
-        } else if self.short.insert(cycle) {
+        let Some(count) = self.cycles.get_mut(&cycle) else { return };
+        let other = !first && count.mapping != objects;
+        objects.clone_into(&mut count.mapping);
+        let was_short = core::mem::replace(&mut count.short, len < expected);
+        if len < expected && !was_short {
             let what = format!("{name} {pdo} has {}, its mapping {expected}", counted(len, "byte", "bytes"));
             self.say(time, bus, &who(node), &what);
         }
-        let mapping = self.mappings.entry(cycle).or_default();
-        let other = !first && *mapping != objects;
-        objects.clone_into(mapping);
         let mut fields = Vec::new();
         for field in tracer.mapped(number, kind, frame.data()) {
             let at = field.object.address();
@@ -309,7 +300,7 @@ impl Teller for Story<'_> {
     ) {
         let time = time.map(|time| time.0);
         if self.start.is_none()
-            && let Some(first) = time.filter(|time| *time >= EPOCH)
+            && let Some(first) = time.filter(|time| Time(*time) >= Time::EPOCH)
         {
             self.start = Some(first);
             let _ = writeln!(self.out, "{:>12}  is {}", "0.000000", date(first));

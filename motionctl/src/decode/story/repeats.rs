@@ -3,7 +3,7 @@
 use std::io::Write as _;
 
 use canopen_master::NodeId;
-use canopen_master::trace::PdoDirection;
+use canopen_master::trace::{Mapped, PdoDirection};
 
 use super::super::Ear;
 use super::rhythm::Rhythm;
@@ -29,6 +29,10 @@ pub(crate) struct Count {
     /// Data of the frame before.
     pub(crate) data: Vec<u8>,
     pub(crate) changes: u64,
+    /// Of a PDO.
+    pub(super) mapping: Vec<Mapped>,
+    /// A PDO has fewer bytes than its mapping.
+    pub(super) short: bool,
 }
 
 impl Cycle {

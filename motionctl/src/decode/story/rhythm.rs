@@ -2,6 +2,8 @@
 
 /// A gap this many times the period is more than jitter: in tenths.
 const GAP: i64 = 15;
+/// Without a beat for so many tenths of the period it is silent: at least two are missing.
+const SILENT: i64 = 25;
 /// A period follows its intervals by one part in so many.
 const SMOOTH: i64 = 8;
 
@@ -43,15 +45,15 @@ impl Rhythm {
         self.longest = Some(self.longest.map_or(gap, |longest| longest.max(gap)));
         let Some(period) = self.period else {
             self.period = Some(gap);
-            self.is_regular(gap);
+            self.count_regular(gap);
             return;
         };
         match self.doubt.take() {
             // The same gap again: that is how it goes now.
             Some((new, _)) if (gap - new).abs() <= new / 4 => {
                 self.period = Some(gap);
-                self.is_regular(new);
-                self.is_regular(gap);
+                self.count_regular(new);
+                self.count_regular(gap);
                 return;
             }
             Some((_, missing)) => self.missed = self.missed.saturating_add(missing),
@@ -62,20 +64,20 @@ impl Rhythm {
             self.doubt = Some((gap, u64::try_from(missing).unwrap_or(0)));
         } else {
             self.period = Some(period + (gap - period) / SMOOTH);
-            self.is_regular(gap);
+            self.count_regular(gap);
         }
     }
 
-    const fn is_regular(&mut self, gap: i64) {
+    const fn count_regular(&mut self, gap: i64) {
         let (sum, number) = self.regular;
         self.regular = (sum.saturating_add(gap), number.saturating_add(1));
     }
 
-    /// How long it has been silent at a time, where that is so long that at least two are missing.
+    /// How long it has been silent at a time, where it is.
     pub(crate) fn silence(&self, time: Option<i64>) -> Option<i64> {
         let (period, last) = self.period.zip(self.last).filter(|_| !self.paused)?;
         let gap = time?.saturating_sub(last);
-        (period > 0 && gap.saturating_mul(10) > period.saturating_mul(25)).then_some(gap)
+        (period > 0 && gap.saturating_mul(10) > period.saturating_mul(SILENT)).then_some(gap)
     }
 
     /// How many did not come until now: those that are due since the last one, too, where it is silent.

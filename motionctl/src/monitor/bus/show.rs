@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use super::super::nodes::View;
 use super::super::sheet::{Sheet, Table, Tone};
-use super::super::time::{age, in_ms, is_silent, seconds, since};
+use super::super::time::{age, in_ms, seconds, since};
 use super::super::traffic::{Rate, Traffic};
 use super::{Buses, Watch};
 use crate::can::value::hex;
@@ -115,7 +115,7 @@ impl Buses<'_> {
                     words.collect::<Vec<_>>().join("; ")
                 }
             };
-            let gone = rhythm.number > 2 && is_silent(rhythm.last, rhythm.period, self.now);
+            let gone = rhythm.number > 2 && rhythm.silence(self.now).is_some();
             let cells = [
                 cycle.name(),
                 rhythm.number.to_string(),
