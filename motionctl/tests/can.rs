@@ -108,7 +108,8 @@ fn layer_setting_services() {
     let mut bench = Bench::new();
     bench.can(&["lss", "fastscan"], 3);
     bench.sim(&["io", "--node", "255", "--serial-number", "77"]);
-    let found = bench.can(&["lss", "fastscan"], 0);
+    // A step of 25 ms, as it is without --timeout, can pass while the machine has other work.
+    let found = bench.can(&["--timeout", "0.05", "lss", "fastscan"], 0);
     assert_eq!((&found["product"], &found["serial"]), (&json!(0x191), &json!(77)));
     assert_eq!(bench.can(&["lss", "identify"], 0)["node"], 255);
     bench.can(&["lss", "set-bit-timing", "300"], 2);
